@@ -136,7 +136,7 @@ def try_fmu(fmu: Path, folder: Path, timeout: float) -> Iterator[Trial]:
     experiment = description.defaultExperiment
     start = float((experiment and experiment.startTime) or 0.0)
     stop = "" if experiment and experiment.stopTime else str(start + DEFAULT_STOP)
-    options = [*(["--stop", stop] if stop else []), "--out", str(folder), "--overwrite"]
+    options = [*(["--stop", stop] if stop else []), "--out", str(folder)]
     reply = run_in_terminal(["run", str(fmu), *options], timeout)
     if "--lenient" in reply.message:
         options.append("--lenient")
@@ -187,7 +187,6 @@ def try_fmu(fmu: Path, folder: Path, timeout: float) -> Iterator[Trial]:
                     name if value else f"{name}=-1:1",
                     "--out",
                     str(folder),
-                    "--overwrite",
                 ],
                 timeout,
             )

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from ..arguments import (
     FINITE,
-    FLAG,
     INCREASING_ROW,
     PATH,
     POSITIVE,
@@ -37,8 +36,6 @@ if TYPE_CHECKING:
     times=INCREASING_ROW,
     outputs=SOME_NAMES,
     rtol=POSITIVE,
-    timeout=POSITIVE,
-    lenient=FLAG,
     progress=PROGRESS,
 )
 @with_progress_bar
@@ -53,8 +50,6 @@ def sensitivity(
     outputs: Sequence[str] | None = None,
     rtol: float | None = None,
     inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | xarray.Dataset | None" = None,
-    timeout: float | None = None,
-    lenient: bool = False,
     progress: Progress | bool | None = None,
 ) -> "SensitivityResult":
     """Run a model with the derivatives of its outputs by parameters, through stick, slip and other events.
@@ -82,10 +77,6 @@ def sensitivity(
         Relative tolerance of the integration; 1e-11 by default.
     inputs : mapping, DataFrame or Dataset, optional
         Input signals as in `simulate`.
-    timeout : float, optional
-        Seconds in which the run of an FMU that is not of this project must end; 60 by default.
-    lenient : bool
-        Whether to run an FMU that violates the FMI standard.
     progress : callable or False, optional
         Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
         switches it off.
@@ -121,7 +112,5 @@ def sensitivity(
         times=spec.times if times is None else times,  # type: ignore[arg-type] # an array by its rule
         outputs=() if outputs is None else tuple(outputs),
         tolerance=rtol,
-        timeout=spec.timeout if timeout is None else timeout,
-        lenient=spec.lenient or lenient,
     )
     return compute_sensitivity(spec, parameters, reporter(progress))

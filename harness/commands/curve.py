@@ -18,7 +18,6 @@ from .terminal import (
     SectionedCommand,
     Terminal,
     result_options,
-    verbose_option,
 )
 
 
@@ -49,7 +48,6 @@ from .terminal import (
     help="Distance in m or rad after a reversal to leave out of a record over time.",
 )
 @result_options
-@verbose_option
 def curve(source: str, terminal: Terminal, **options: Any) -> None:
     """Identify friction over velocity from measured points in FILE, or from a record over time.
 

@@ -24,7 +24,6 @@ from .terminal import (
     Terminal,
     refuse_options,
     result_options,
-    verbose_option,
 )
 
 if TYPE_CHECKING:
@@ -62,7 +61,6 @@ COLUMN_OPTIONS = (  # of records
 @click.option("--drag/--no-drag", default=True, show_default=True, help="Fit the models with quadratic drag as well.")
 @click.option("--drift", is_flag=True, help="Fit a linear drift of the rest position or sensor offset.")
 @result_options
-@verbose_option
 @click.pass_context
 def decay(
     context: click.Context,

@@ -12,11 +12,11 @@ from .terminal import (
     HEADINGS_OPTION,
     POSITIVE,
     RATE_OPTION,
+    SET_OPTION,
     TIME_OPTION,
     SectionedCommand,
     Terminal,
     result_options,
-    verbose_option,
 )
 
 
@@ -24,12 +24,7 @@ from .terminal import (
 @click.argument("model", metavar="MODEL|FMU")
 @click.argument("records", metavar="FILE...", nargs=-1, required=True)
 @click.option("--free", multiple=True, metavar="NAME[=LOW:HIGH],...", help="Parameters to fit, and ranges to search.")
-@click.option(
-    *("--set", "values"),
-    multiple=True,
-    metavar="NAME=VALUE,...",
-    help="Values of other parameters.",
-)
+@SET_OPTION
 @click.option(
     "--observe",
     multiple=True,
@@ -57,7 +52,6 @@ from .terminal import (
     "--timeout", type=POSITIVE, default=10.0, show_default=True, help="Seconds of processor time for one run."
 )
 @result_options
-@verbose_option
 def fit(
     model: str,
     records: tuple[str, ...],

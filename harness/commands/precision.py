@@ -6,8 +6,6 @@ import click
 
 from .terminal import SectionedCommand, Terminal, result_options
 
-QUICK_RUN = "a quick run"  # does not replace a full run
-
 
 @click.command(cls=SectionedCommand)
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
@@ -27,7 +25,6 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
       friction-fmus precision path/to/belt.py
     """
     from ..references.models import MODELS
-    from ..results.provenance import load_provenance
     from ..results.result import save_result
     from ..scenes.fmu_files import find_fmu
     from ..simulation.embedded_model import load_model_class
@@ -40,11 +37,9 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
         load_model_class(file)  # before the first measurement
     with terminal.progress(len(files)) as report:
         for model, file in files.items():
-            # a full run replaces a quick one
-            source = QUICK_RUN if quick else load_provenance(out / file.stem).get("source", "")
             compute = partial(measure_precision, model, settings, partial(report, model))
             origin = {"files": [file], "parameters": declared_parameters(file)}
-            results.append(save_result(out / file.stem, compute, "precision", source, **origin))
+            results.append(save_result(out / file.stem, compute, "precision", "", **origin))
     data = {
         "points": {result.model: result.points for result in results},
         "laws": [law for result in results for law in result.deviations],

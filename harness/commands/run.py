@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import HarnessError, RunError
-from .terminal import SectionedCommand, Terminal, refuse_ignored_options, result_options, run_options
+from .terminal import SET_OPTION, SectionedCommand, Terminal, refuse_ignored_options, result_options, run_options
 
 if TYPE_CHECKING:
     from ..studies.run.result import RunResult
@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 
 @click.command(cls=SectionedCommand)
 @click.argument("source", metavar="MODEL|SCENE|FMU")
-@click.option(
-    *("--set", "values"),
-    multiple=True,
-    metavar="NAME=VALUE,...",
-    help="Parameters and start values; those of a scene are replaced. Repeatable.",
-)
+@SET_OPTION
 @run_options
 @result_options
 @click.pass_context

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from .terminal import FINITE, POSITIVE, SectionedCommand, Terminal, is_given, result_options
+from .terminal import POSITIVE, SET_OPTION, STOP_OPTION, SectionedCommand, Terminal, is_given, result_options
 
 
 def split_names(context: click.Context, option: click.Parameter, text: str | None) -> list[str] | None:
@@ -22,23 +22,10 @@ def split_names(context: click.Context, option: click.Parameter, text: str | Non
     callback=split_names,
     help="Parameters, start values, inputs.",
 )
-@click.option(
-    *("--set", "values"),
-    multiple=True,
-    metavar="NAME=VALUE,...",
-    help="Parameters and start values; those of a scene are replaced. Repeatable.",
-)
+@SET_OPTION
 @click.option("--outputs", metavar="NAME,...", callback=split_names, help="Outputs; by default all Reals.")
-@click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
+@STOP_OPTION
 @click.option("--rtol", type=POSITIVE, help="Relative tolerance of the integration.  [default: 1e-11]")
-@click.option("--lenient", is_flag=True, help="Run the FMU even if it violates the FMI standard.")
-@click.option(
-    "--timeout",
-    type=POSITIVE,
-    default=60.0,
-    show_default=True,
-    help="Seconds in which the run of an FMU that is not of this project must end.",
-)
 @result_options
 @click.pass_context
 def sensitivity(

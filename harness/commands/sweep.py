@@ -9,6 +9,7 @@ import click
 from ..arguments import NATURAL, RUNS, WORKERS
 from ..errors import MAX_VALUE_LENGTH, SceneError
 from .terminal import (
+    SET_OPTION,
     RuleType,
     SectionedCommand,
     Terminal,
@@ -28,7 +29,7 @@ from .terminal import (
     metavar="NAME=LO:HI:N",
     help="Parameter to vary; append :log for logarithmic spacing, or list values or labels: a,b,c.",
 )
-@click.option("--set", "values", multiple=True, metavar="NAME=VALUE,...", help="Values set in every run.")
+@SET_OPTION
 @click.option(
     "--samples",
     type=RuleType(RUNS),

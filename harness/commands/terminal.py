@@ -32,7 +32,7 @@ SECTIONS = {  # of the help of a command: options that several commands share, e
         *("headings", "rate", "begin", "end"),
     ),
     "Run": ("stop", "rtol", "interface", "lenient", "timeout"),
-    "Output": ("name", "out", "overwrite", "verbose", "as_json"),
+    "Output": ("name", "out", "as_json"),
 }
 
 
@@ -64,36 +64,6 @@ default_out_option = out_option("Folder for the results, with one subfolder per 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print only the result, as JSON.")
 
 
-def allow_overwrite(context: click.Context, option: click.Parameter, requested: bool) -> None:
-    """Allow results to be replaced in this process."""
-    from ..results.folder import OVERWRITE as allowed
-
-    allowed.set(allowed.get() or requested)
-
-
-def show_all_remarks(context: click.Context, option: click.Parameter, requested: bool) -> None:
-    """Print all remarks in this process."""
-    from ..results.summary import VERBOSE
-
-    VERBOSE.set(requested)
-
-
-verbose_option = click.option(
-    "--verbose",
-    is_flag=True,
-    expose_value=False,
-    callback=show_all_remarks,
-    help="Print all remarks, not only the five with the largest effect.",
-)
-overwrite_option = click.option(
-    "--overwrite",
-    is_flag=True,
-    expose_value=False,
-    callback=allow_overwrite,
-    help="Replace an existing result of another scene, FMU or file.",
-)
-
-
 EXACT = "exact"  # method of FMUs of this project
 
 
@@ -108,7 +78,7 @@ def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
                 raise click.UsageError(f"{argument.make_metavar(context).strip('[]')} is empty: give a name or a path")
         return command(terminal=Terminal(as_json, out), **others)
 
-    return default_out_option(overwrite_option(json_option(wrapper)))
+    return default_out_option(json_option(wrapper))
 
 
 class RuleType(click.FloatRange):
@@ -140,8 +110,15 @@ RATE_OPTION = click.option(
 )
 BEGIN_OPTION = click.option("--begin", type=FINITE, help="Ignore samples before this time in s.")
 END_OPTION = click.option("--end", type=FINITE, help="Ignore samples after this time in s.")
+SET_OPTION = click.option(
+    *("--set", "values"),
+    multiple=True,
+    metavar="NAME=VALUE,...",
+    help="Parameters and start values; those of a scene are replaced. Repeatable.",
+)
+STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
 RUN_OPTIONS = (
-    click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU."),
+    STOP_OPTION,
     click.option(
         "--rtol",
         type=POSITIVE,

@@ -43,7 +43,7 @@ class Section:
     items: tuple[ResultItem, ...] = ()
 
 
-def write_report(results: Path, title: str) -> Path:
+def write_report(results: Path) -> Path:
     """Write the page of all results in a folder to that folder, and return its path.
 
     Raises
@@ -55,7 +55,6 @@ def write_report(results: Path, title: str) -> Path:
     if not items:
         raise HarnessError(f"no results in {results}: run a command that writes some, or choose another --out")
     page = TEMPLATE.render(
-        title=title,
         sections=build_sections(items),
         live=relative_path(LIVE_PAGE, results),
         made=f"{date.today()} by {HARNESS} {package_version(HARNESS)}",

@@ -16,7 +16,6 @@ import re
 import sys
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from contextvars import ContextVar
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
@@ -29,7 +28,6 @@ from .stored_data import DATA_FILE
 from .summary import SUMMARY_FILE
 
 LOG = logging.getLogger(__name__)
-OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of another source may be replaced
 FRESH, OLD = ".new", ".old"  # suffixes of temporary folders, after the result's name and eight characters
 AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
 
@@ -52,7 +50,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
     Raises
     ------
     HarnessError
-        If the old folder is a link, contains other files, or is a result of another `source` without OVERWRITE.
+        If the old folder is a link, contains other files, or is a result of another `source`.
     """
     try:
         own_files = (*own_files, DATA_FILE, FILE, SUMMARY_FILE)
@@ -104,13 +102,12 @@ def check_replaceable(folder: Path, own_files: Collection[str]) -> None:
 
 
 def check_same_source(folder: Path, source: str) -> None:
-    """Raise HarnessError if a result of another source exists, unless OVERWRITE is set."""
+    """Raise HarnessError if a result of another source exists."""
     old = load_provenance(folder)
-    if old.get("source", source) != source and not OVERWRITE.get():
+    if old.get("source", source) != source:
         origin = f"`{old['command']}`" + (f", from {old['source']}" if old.get("source") else "")
         raise HarnessError(
-            f"{folder} holds the result of {origin}; choose another {option_text('folder')}, or replace it with "
-            f"{option_text('overwrite', True)}"
+            f"{folder} holds the result of {origin}; choose another {option_text('folder')}, or remove the folder"
         )
 
 

@@ -7,10 +7,10 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from ..arguments import AXES, FLAG, PATH, check_arguments
+from ..arguments import AXES, PATH, check_arguments
 from ..errors import HarnessError, check_names, import_optional
 from .files import to_json
-from .folder import OVERWRITE, replace_folder
+from .folder import replace_folder
 from .provenance import write_provenance
 from .stored_data import DATA_FILE, read_data, write_data
 from .summary import PICTURE_FILE, Outcome, Summary, write_summary
@@ -158,33 +158,27 @@ class Result(ABC):
                 text.set_parse_math(False)
         return np.array(figure.axes)
 
-    @check_arguments(folder=PATH, overwrite=FLAG)
-    def save(self, folder: str | Path, overwrite: bool = False) -> None:
+    @check_arguments(folder=PATH)
+    def save(self, folder: str | Path) -> None:
         """Write the result into a folder: its files, figure, provenance and summary; `load_result` reads it.
 
         Parameters
         ----------
         folder : path
             A new folder, or one that holds a result of the same source.
-        overwrite : bool
-            Whether a result of another source may be replaced.
 
         Raises
         ------
         HarnessError
-            If the folder holds other files, or the result of another source without `overwrite`.
+            If the folder holds other files, or the result of another source.
         """
         from .registry import find_study
 
         origin = self._origin()
-        allowed = OVERWRITE.set(OVERWRITE.get() or overwrite)
-        try:
-            with replace_folder(Path(folder), find_study(self.study).files, origin["source"]) as new_folder:
-                self._write(new_folder)
-                write_provenance(new_folder, **origin, command=f"harness.{self._function}")
-                write_summary(new_folder, replace(self.summary(), title=Path(folder).name))
-        finally:
-            OVERWRITE.reset(allowed)
+        with replace_folder(Path(folder), find_study(self.study).files, origin["source"]) as new_folder:
+            self._write(new_folder)
+            write_provenance(new_folder, **origin, command=f"harness.{self._function}")
+            write_summary(new_folder, replace(self.summary(), title=Path(folder).name))
 
     def _origin(self) -> dict[str, Any]:
         """Return the files, parameters and source for the provenance of a result that Python saves."""

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Sequence
-from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,15 +16,13 @@ VERSION = 1  # of the schema
 STEPS_TABLE, METHODS_TABLE = "Internal steps of the solver", "Fastest methods"
 MAX_DEVIATION = 5.0  # percent; a result agrees with its known values up to this difference
 MAX_REMARKS = 5  # that are printed; the first ones have the largest effect on the answer
-VERBOSE: ContextVar[bool] = ContextVar("VERBOSE", default=False)
 
 
 def limit_remarks(remarks: Sequence[str]) -> list[str]:
     """Return the remarks to print, and a sentence on where the others are."""
-    shown = len(remarks) if VERBOSE.get() else MAX_REMARKS
-    others = by_interface("--verbose prints them", "`remarks` has them")
-    count = len(remarks) - shown
-    return [*remarks[:shown], *([f"{count} more remark{'s' * (count > 1)}: {others}."] if count > 0 else [])]
+    others = by_interface("--json prints them", "`remarks` has them")
+    count = len(remarks) - MAX_REMARKS
+    return [*remarks[:MAX_REMARKS], *([f"{count} more remark{'s' * (count > 1)}: {others}."] if count > 0 else [])]
 
 
 @dataclass(frozen=True)

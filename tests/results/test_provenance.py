@@ -150,7 +150,7 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
         ],
     ),
 )
-def test_a_result_of_another_scene_is_replaced_only_with_overwrite(workspace, fmus, first, second, folder):
+def test_a_result_of_another_scene_is_not_replaced(workspace, fmus, first, second, folder):
     for subfolder in ("a", "b", "b/a"):
         (workspace / subfolder).mkdir()
         (workspace / subfolder / "mine.toml").write_text(MINE)
@@ -161,13 +161,8 @@ def test_a_result_of_another_scene_is_replaced_only_with_overwrite(workspace, fm
     done = harness(workspace, *second)
     assert (done.returncode, done.stderr.count("\n"), done.stdout) == (1, 1, "")
     assert f"results/{folder} holds the result of `python -m harness {' '.join(first)}`" in done.stderr
-    assert "choose another --out, or replace it with --overwrite" in done.stderr
+    assert "choose another --out, or remove the folder" in done.stderr
     assert files(workspace / "results" / folder) == before
-    source = read_provenance(workspace / "results" / folder)["source"]
-    assert harness(workspace, *second, "--overwrite").returncode == 0
-    now = read_provenance(workspace / "results" / folder)
-    assert now["command"] == " ".join(("python -m harness", *second, "--overwrite"))
-    assert now["source"] != source
 
 
 def test_a_result_with_other_values_is_not_replaced_silently(workspace):

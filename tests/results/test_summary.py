@@ -67,5 +67,3 @@ def test_five_remarks_are_printed_and_the_others_counted(tmp_path):
     for count, last in ((5, "remark 4"), (8, "3 more remarks: `remarks` has them.")):
         decay = replace(decay, remarks=tuple(f"remark {i}" for i in range(count)))
         assert decay.blocks()[-1] == last
-    table = "t [s],x [m]\n" + "\n".join(f"{a:.3f},{b:.6f}" for a, b in zip(t, x, strict=True))
-    assert commands.harness(tmp_path, "decay", "-", "--verbose", text=table).returncode == 0

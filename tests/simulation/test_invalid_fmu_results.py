@@ -20,7 +20,7 @@ def run_faulty(folder, name, fault, value=0.0, *options, fmu=None):
     """Run an FMU with a fault; return the error message and what was recorded until then."""
     fmu = fmu or build_external_fmus() / f"{name}.fmu"
     settings = "--set", f"fault={fault}", "--set", f"value={value!r}"
-    done = commands.harness(folder, "run", fmu, *settings, *options, "--overwrite")
+    done = commands.harness(folder, "run", fmu, *settings, *options)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     return done.stderr, harness.load_result(folder / "results" / name)
 

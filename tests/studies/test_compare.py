@@ -473,7 +473,7 @@ def test_external_fmus_are_compared(harness, external_fmu_folder, pair, message)
 
 def test_rtol_sets_the_solver_in_the_command_as_in_the_api(harness, fmus):
     pair = [str(fmus / f"{name}.fmu") for name in ("pacejka", "stickslip")]
-    texts = [harness("compare", *pair, "--rtol", rtol, "--json", "--overwrite").stdout for rtol in (1e-3, 1e-6)]
+    texts = [harness("compare", *pair, "--rtol", rtol, "--json").stdout for rtol in (1e-3, 1e-6)]
     answers = [json.loads(text)["variables"] for text in texts]
     assert answers[0] != answers[1]
     expected = compare(*pair, rtol=1e-3).as_json()["variables"]

@@ -1,6 +1,5 @@
 """Work-precision diagrams: measurements, gaps and advice."""
 
-import json
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -196,17 +195,6 @@ def test_no_advice_is_given_without_sufficient_evidence():
         assert complete.startswith("stickslip: use rodas: ")
         assert ("scipy LSODA 0.85, not a method of the FMU" in complete) == (peer < own.seconds)
     assert make_study(min_ratio=QUICK.min_ratio).advice == message
-
-
-def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path):
-    folder = tmp_path / "precision/smd"
-    folder.mkdir(parents=True)
-    origin = {"command": "precision smd", "date": "2026-11-27", "files": {}, "parameters": {}, "scene": None}
-    origin["source"] = ""
-    (folder / "provenance.json").write_text(json.dumps(origin))
-    done = command(user_folder, "smd", "--quick", "--out", tmp_path)
-    assert done.returncode == 1
-    assert "choose another --out, or replace it with --overwrite" in done.stderr
 
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
