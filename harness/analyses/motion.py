@@ -7,11 +7,18 @@ import numpy as np
 
 from ..errors import check_names, import_optional
 from ..results.quantity import Quantity
+from ..results.table import ResultColumn, ResultTable, format_blocks, format_html
 from .decay.decrement import find_extrema_from_velocity
 
 if TYPE_CHECKING:
     import pandas
 
+TEXT_WIDTH = 100  # characters of a line of `str`
+COLUMNS = (
+    ResultColumn("quantity", "{0.text}", is_text=True),
+    ResultColumn("value", lambda quantity: quantity.format()[0]),
+    ResultColumn("unit", lambda quantity: quantity.format()[1], is_text=True),
+)
 SLOW = 1e-3  # of the largest speed: below it a body rests, or creeps
 SHORTEST_REST = 0.2  # of the median time between rests, unless the speed is exactly 0: turning points are shorter
 
@@ -53,15 +60,22 @@ class MotionMeasures:
         check_names("quantity", [name], values)
         return values[name]
 
+    @property
+    def _table(self) -> ResultTable:
+        """The table of all quantities."""
+        return ResultTable(self.quantities, COLUMNS)
+
     def __str__(self) -> str:
-        width = max(len(quantity.text) for quantity in self.quantities)
-        return "\n".join(f"{q.text:<{width}}  {' '.join(q.format())}".rstrip() for q in self.quantities)
+        return format_blocks([self._table], TEXT_WIDTH)
+
+    def _repr_html_(self) -> str:
+        """Return the table for notebooks."""
+        return format_html([self._table])
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Convert the quantities to a DataFrame with a row for each; HarnessError if pandas is not installed."""
         library = import_optional("pandas", "to_pandas()", "sweep")
-        rows = [{"name": q.name, "value": q.value, "unit": q.unit, "text": q.text} for q in self.quantities]
-        frame: pandas.DataFrame = library.DataFrame(rows).set_index("name")
+        frame: pandas.DataFrame = library.DataFrame(self._table.records()).set_index("name")
         return frame
 
 

@@ -406,6 +406,13 @@ def test_a_scene_runs_to_another_stop_and_is_not_compared_then(workspace):
     assert load_result(workspace / "results" / "stickslip").time[-1] == 9.0
 
 
+def test_a_scene_that_runs_too_short_for_an_analysis_names_it(workspace):
+    done = harness(workspace, "run", "stickslip", "--stop", 5)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "the analysis 'slip' needs two slips, and the run has 1: set a later stop" in done.stdout
+    assert load_result(workspace / "results" / "stickslip").time[-1] == 5.0
+
+
 def test_the_first_slip_without_modes_is_named_as_what_is_measured(workspace):
     """A sled that creeps breaks away at no time; it becomes as fast as the driver later than a stick ends."""
     texts = [harness(workspace, "run", name, "--stop", 9).stdout for name in ("stickslip", "pacejka-0.001")]
