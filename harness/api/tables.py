@@ -112,7 +112,9 @@ def to_record(source: Any, options: "ColumnOptions", heading: str = SIGNAL, need
     table = convert_to_table(source, heading, options.rate, needs_times)
     if not has_columns(source) and not isinstance(source, tuple):  # its times follow from the rate
         options = replace(options, rate=None)
-    return Record(source.name if is_signals(source) else table.name, table, options)
+    if is_signals(source):
+        return Record(source.name, table, options, getattr(source, "parameters", {}))
+    return Record(table.name, table, options)
 
 
 def convert_to_table(

@@ -43,11 +43,14 @@ class Record:
         All columns, as they are in the file.
     options : ColumnOptions
         How the columns are read.
+    parameters : mapping
+        Values of the parameters of the run that the record stems from, by name; empty for a measurement.
     """
 
     name: str
     table: Table
     options: ColumnOptions = field(default_factory=ColumnOptions)
+    parameters: Mapping[str, object] = field(default_factory=dict)
 
     @cached_property
     def motion(self) -> Motion:

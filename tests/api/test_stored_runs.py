@@ -84,3 +84,17 @@ def test_input_signals_of_a_scene_are_those_of_python():
     python = harness.simulate("smd", {"c": 3.0}, stop=2.0, interval=0.01, inputs=INPUTS, outputs=["x", "v"])
     assert scene["x"] == pytest.approx(python["x"], abs=1e-5)
     assert np.abs(scene["x"]).max() > 0.01
+
+
+@pytest.mark.parametrize("source", ["run", "stored run", "trajectory.csv"])
+def test_a_fit_fixes_the_values_of_its_run(source):
+    """Those that the FMU has otherwise would shift all others without a word."""
+    fmu = native_fmus.build_native_fmus() / "coulomb.fmu"
+    run = harness.simulate(fmu, {"m": 2.0, "x0": 0.2, "f": 0.3}, stop=4.0)
+    run.save("mine")
+    record = {"run": run, "stored run": harness.load_result("mine"), "trajectory.csv": "mine/trajectory.csv"}[source]
+    fit = harness.fit(fmu, record, ["f", "k"], observe=["x"])
+    assert (fit["f"].value, fit["k"].value) == pytest.approx((0.3, run.parameters["k"]), rel=1e-6)
+    assert fit.notes[-1] == "m = 2.0, x0 = 0.2, as in the run of the record; `values` sets other values."
+    with pytest.raises(harness.SceneError, match=r"differ in m, 2.0 and 3.0: free it, and name it in `each`"):
+        harness.fit(fmu, [run, harness.simulate(fmu, {"m": 3.0}, stop=4.0)], ["f"], observe=["x"])

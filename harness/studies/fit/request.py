@@ -24,13 +24,14 @@ from ...scenes.roles import ROLES, find_roles
 from ...scenes.run_spec import RunSpec
 from ...simulation.fmu_archive import default_stop, read_description
 from ...simulation.model_data import read_model_data
-from ...simulation.variable_values import convert_value, enumeration_labels
+from ...simulation.variable_values import convert_value, effective_value, enumeration_labels
 from ...simulation.whole_run import RealVariable, real_variables
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
 SPAN_RATIO = 4.0  # about a factor of a thousand between a record and a run of the FMU: its times have another unit
 DELAY_SHARE = 0.1  # of the duration of the shortest record: default range of a delay
+SOLVER = "solver."  # beginning of the names of the settings of a solver
 READABLE = ("output", "local")  # causalities of variables that can be observed
 TOLERANCE, SOLVER_RTOL = 1e-8, "solver.rtol"  # larger tolerances make the derivatives of residuals inaccurate
 # at this tolerance, dop853 takes half of the time of ode45, and ode23 takes longer than ode45
@@ -401,7 +402,39 @@ def choose_columns(request: FitRequest, records: Sequence[Record]) -> tuple[FitR
     """
     request, driven = choose_inputs(request, records)
     request, observed = choose_observed(request, records[0])
-    return request, tuple(filter(None, (observed, driven)))
+    request, fixed = fix_run_values(request, records)
+    return request, tuple(filter(None, (observed, driven, fixed)))
+
+
+def fix_run_values(request: FitRequest, records: Sequence[Record]) -> tuple[FitRequest, str]:
+    """Return a request that fixes the parameters in which the runs of the records differ from the FMU, and a sentence.
+
+    These are no settings of the solver. The sentence is empty without any, as for measured records.
+
+    Raises
+    ------
+    SceneError
+        If a parameter has several values in the runs.
+    """
+    values: dict[str, Any] = {}
+    for variable in read_description(request.run.fmu).modelVariables:
+        name = variable.name
+        if variable.causality != "parameter" or name.startswith(SOLVER) or name in (*request.free, *request.run.values):
+            continue
+        found = [*dict.fromkeys(record.parameters[name] for record in records if name in record.parameters)]
+        if len(found) > 1:
+            both = f"{found[0]} and {found[1]}"
+            raise SceneError(
+                f"the runs of the records differ in {name}, {both}: free it, and name it in {option_text('each')}"
+            )
+        if found and found[0] != effective_value(variable, variable.start):
+            values[name] = found[0]
+    if not values:
+        return request, ""
+    settings = ", ".join(f"{name} = {value}" for name, value in values.items())
+    run = replace(request.run, values=values | dict(request.run.values))
+    sentence = f"{settings}, as in the run of the record; {option_text('values')} sets other values."
+    return replace(request, run=run), sentence
 
 
 def choose_inputs(request: FitRequest, records: Sequence[Record]) -> tuple[FitRequest, str]:

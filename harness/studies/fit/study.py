@@ -6,7 +6,7 @@ In a comparison of laws, each FMU frees and fixes those names that it has.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from os.path import exists
+from os.path import basename, exists
 from pathlib import Path
 from time import process_time
 
@@ -22,6 +22,7 @@ from ...errors import HarnessError, SceneError, check_names, format_value, optio
 from ...records.columns import ColumnOptions
 from ...records.extraction import Samples
 from ...records.record import Record, load_record
+from ...results.provenance import load_provenance
 from ...simulation.fmu_archive import read_description
 from ...simulation.model_data import read_tables_with
 from ...simulation.native_equivalent import native_equivalent
@@ -40,6 +41,8 @@ from .request import (
     variable_names,
 )
 from .result import FitResult
+
+TRAJECTORY_FILE = "trajectory.csv"  # of a stored run
 
 
 def make_tasks(request: FitRequest, own_notes: tuple[str, ...] = ()) -> tuple[FitTask, ...]:
@@ -126,10 +129,14 @@ def law_names(fmus: list[Path]) -> list[str]:
 
 
 def load_existing(source: str, options: ColumnOptions) -> Record:
-    """Load the record in a file; SceneError if there is none."""
+    """Load the record in a file, of a stored run with its parameters; SceneError if there is none."""
     if source != "-" and not exists(source):
         raise SceneError(f"{format_value(source)} does not exist: give an existing record")
-    return load_record(source, options)
+    record = load_record(source, options)
+    if basename(source) != TRAJECTORY_FILE:
+        return record
+    stored = load_provenance(Path(source).parent).get("parameters", {})
+    return replace(record, parameters={name: parameter["value"] for name, parameter in stored.items()})
 
 
 def fit_laws(
