@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Sequence
 from math import isnan
 
-from harness.results.summary import Summary, SummaryTable
-from harness.results.table import ResultColumn, ResultTable
+from harness.results.summary import ResultColumn, ResultTable, Summary, SummaryTable
 
 from .benchmark import Baseline, Benchmark
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from harness.results.quantity import format_power
-from harness.results.table import ResultColumn, ResultTable
+from harness.results.summary import ResultColumn, ResultTable
 
 from .study import LiteratureRun
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from harness.results.table import ResultColumn, ResultTable
+from harness.results.summary import ResultColumn, ResultTable
 
 from .catalogue import OWN
 from .comparison import Comparison, Result, format_setting

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import check_names, import_optional
 from ..results.quantity import Quantity
-from ..results.table import ResultColumn, ResultTable, format_blocks, format_html
+from ..results.summary import ResultColumn, ResultTable, format_blocks, format_html
 from .decay.decrement import find_extrema_from_velocity
 
 if TYPE_CHECKING:

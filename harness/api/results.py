@@ -29,6 +29,6 @@ def load_result(folder: "str | Path") -> "Result":
     SceneError
         If the folder holds no result, or it is damaged.
     """
-    from ..results.loading import load
+    from ..results.registry import load
 
     return load(Path(folder))

@@ -23,8 +23,8 @@ from shutil import rmtree
 from ..errors import HarnessError, option_text
 from ..process.interrupt import defer_signals
 from ..process.temporary_directory import create_locked_folder, lock_path
+from .files import DATA_FILE
 from .provenance import FILE, load_provenance, note_replaced_result
-from .stored_data import DATA_FILE
 from .summary import SUMMARY_FILE
 
 LOG = logging.getLogger(__name__)

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from ..arguments import AXES, PATH, check_arguments
 from ..errors import HarnessError, check_names, import_optional
-from .files import to_json
+from .files import DATA_FILE, read_data, to_json, write_data
 from .folder import replace_folder
 from .provenance import write_provenance
-from .stored_data import DATA_FILE, read_data, write_data
-from .summary import PICTURE_FILE, Outcome, Summary, write_summary
-from .table import ResultTable, format_blocks, format_html
+from .summary import PICTURE_FILE, Outcome, ResultTable, Summary, format_blocks, format_html, write_summary
 
 if TYPE_CHECKING:
     import numpy as np

@@ -1,15 +1,24 @@
-"""Summaries of results: every study writes summary.json in one schema, and the report reads nothing else."""
+"""Tables and summaries of results: terminal, notebooks, report, JSON, CSV and pandas follow from one table.
+
+Every study writes summary.json in one schema, and the report reads nothing else.
+"""
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from html import escape
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import HarnessError, SceneError, by_interface
 from ..scenes.schema import parse_table
 from . import provenance
-from .files import to_json
+from .files import column_heading, to_json, write_csv_rows
+
+if TYPE_CHECKING:
+    import rich.table
+
 
 SUMMARY_FILE, PICTURE_FILE = "summary.json", "figure.svg"
 VERSION = 1  # of the schema
@@ -142,3 +151,135 @@ def read_summary(folder: Path) -> Summary:
         reason = f"is not valid ({error})"
     command = provenance.load_provenance(folder).get("command", "the command that wrote it")
     raise HarnessError(f"{SUMMARY_FILE} {reason}: run `{command}` again")
+
+
+@dataclass(frozen=True)
+class ResultColumn:
+    """Column of a table.
+
+    Attributes
+    ----------
+    heading : str
+        Heading.
+    text : str or callable
+        Text of an item: a format such as "{0.rms:.3e}", or a function.
+    is_text : bool
+        Whether the cells are words, which are flush left, and not numbers.
+    """
+
+    heading: str
+    text: str | Callable[[Any], str]
+    is_text: bool = False
+
+    def cell(self, item: Any) -> str:
+        """Return the text of an item."""
+        return self.text.format(item) if isinstance(self.text, str) else self.text(item)
+
+
+@dataclass(frozen=True)
+class ResultTable:
+    """Items of a result, a row for each.
+
+    Attributes
+    ----------
+    items : sequence
+        Dataclasses or mappings; their fields are the columns of JSON, CSV and pandas.
+    columns : sequence of ResultColumn
+        Columns of the terminal, of notebooks and of the report.
+    title : str
+        Title; empty for none.
+    units : mapping
+        Units of fields by name, for CSV.
+    group : callable, optional
+        Returns the first cells of the line above the items that have them in common.
+    note : str
+        Note below the table in the terminal.
+    padding : int
+        Blanks between columns in the terminal.
+    """
+
+    items: Sequence[Any]
+    columns: Sequence[ResultColumn]
+    title: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
+    group: Callable[[Any], tuple[str, ...]] | None = None
+    note: str = ""
+    padding: int = 1
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        return tuple(column.heading for column in self.columns)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return the texts of each item."""
+        return [tuple(column.cell(item) for column in self.columns) for item in self.items]
+
+    def groups(self) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
+        """Return the line above each group of items, which is empty without groups, and the texts of these items."""
+        rows = iter(self.rows())
+        keys = groupby(self.items, self.group or (lambda item: ()))
+        blanks = ("",) * len(self.columns)
+        return [((*key, *blanks[len(key) :]) if key else (), [next(rows) for _ in items]) for key, items in keys]
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the fields of each item by name, for JSON and pandas."""
+        return [asdict(item) if is_dataclass(item) and not isinstance(item, type) else {**item} for item in self.items]
+
+    def summarize(self) -> tuple[SummaryTable, ...]:
+        """Return the table as the summary of a result stores it, as the only item; nothing if it has no rows."""
+        rows = tuple(row for line, texts in self.groups() for row in (*[line] * bool(line), *texts))
+        return (SummaryTable(self.headings, rows, self.title),) if rows else ()
+
+    def for_terminal(self) -> "rich.table.Table":
+        """Return the table for the terminal, in the style of all results."""
+        from rich.box import SIMPLE_HEAD
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        table = RichTable(title=self.title or None, title_justify="left", box=SIMPLE_HEAD, show_edge=False)
+        table.min_width = len(self.title)
+        table.padding, table.caption, table.caption_justify = (0, self.padding, 0, 0), self.note or None, "left"
+        for column in self.columns:
+            justify = {"no_wrap": column.heading == "unit"} if column.is_text else {"justify": "right", "no_wrap": True}
+            table.add_column(column.heading, overflow="fold", **justify)
+        for line, rows in self.groups():
+            if line:
+                table.add_section()
+                table.add_row(Text(line[0], style="bold"), *line[1:])
+            for row in rows:
+                table.add_row(*(f"  {row[0]}" if line else row[0], *row[1:]))
+        return table
+
+    def as_html(self) -> str:
+        """Return the table as HTML for notebooks; empty if it has no rows."""
+        lines = []
+        for table in self.summarize():
+            caption = f"<caption>{escape(table.title)}</caption>" if table.title else ""
+            cells = [("th", table.headings), *(("td", row) for row in table.rows)]
+            rows = (f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in row)}</tr>" for tag, row in cells)
+            lines.append(f"<table>{caption}{''.join(rows)}</table>")
+        return "".join(lines)
+
+    def write_csv(self, path: Path) -> None:
+        """Write the fields of all items, with their units in the headings; None and NaN are empty cells."""
+        records = self.records()
+        headings = [column_heading(name, self.units.get(name, "")) for name in records[0]]
+        rows = ([None if value != value else value for value in record.values()] for record in records)
+        write_csv_rows(path, headings, rows)
+
+
+def format_blocks(blocks: Iterable[ResultTable | str], width: int) -> str:
+    """Return tables and sentences as text."""
+    from rich.console import Console
+
+    console = Console(width=width, markup=False, highlight=False)
+    with console.capture() as text:
+        for block in blocks:
+            console.print(block.for_terminal() if isinstance(block, ResultTable) else block)
+    return text.get().rstrip("\n")
+
+
+def format_html(blocks: Iterable[ResultTable | str]) -> str:
+    """Return tables and sentences as HTML."""
+    shown = (block for block in blocks if block != "")
+    return "".join(block.as_html() if isinstance(block, ResultTable) else f"<p>{escape(block)}</p>" for block in shown)

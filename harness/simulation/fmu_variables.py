@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
 from ..errors import check_names, import_optional
-from ..results.table import ResultColumn, ResultTable, format_blocks, format_html
+from ..results.summary import ResultColumn, ResultTable, format_blocks, format_html
 from .fmu_archive import read_description
 from .model_data import LookupTable, read_model_data
 from .variable_values import ExclusiveBound, effective_value, enumeration_labels, find_bound, variable_unit

@@ -20,7 +20,7 @@ from fmus.compiler.model_lookup import more_model_names
 from harness import HarnessError, PrecisionResult
 from harness.commands import commands
 from harness.references.peer_solvers import FMU, ME
-from harness.results.table import format_blocks
+from harness.results.summary import format_blocks
 from harness.studies.precision.study import LawDeviation, Point, PrecisionCase
 
 SCENES = {file.stem: tomllib.loads(file.read_text()) for file in sorted((ROOT / "harness/scenes").glob("*.toml"))}

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...results.provenance import describe_sources, prefix_parameters
 from ...results.result import Result
-from ...results.summary import Summary
-from ...results.table import ResultColumn, ResultTable
+from ...results.summary import ResultColumn, ResultTable, Summary
 from ...simulation.trajectory import describe_accuracy, effective_parameters
 from .study import Comparison
 

@@ -13,8 +13,7 @@ from ...errors import option_text
 from ...results.files import column_heading, write_csv
 from ...results.quantity import format_interval
 from ...results.result import Result
-from ...results.summary import limit_remarks
-from ...results.table import ResultColumn, ResultTable
+from ...results.summary import ResultColumn, ResultTable, limit_remarks
 from .model_file import (
     LAW_MODEL,
     LINEAR_FORCE,

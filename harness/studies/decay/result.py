@@ -13,8 +13,7 @@ from ...analyses.estimation.estimate import ColumnResiduals, Estimate, UsedSampl
 from ...results.files import column_heading, write_csv
 from ...results.quantity import format_interval
 from ...results.result import Result
-from ...results.summary import limit_remarks
-from ...results.table import ResultColumn, ResultTable
+from ...results.summary import ResultColumn, ResultTable, limit_remarks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ...references.peer_solvers import FMI3_TOOLS, FMPY, FMU, ME
 from ...results.quantity import format_power
 from ...results.result import Result
-from ...results.summary import METHODS_TABLE, Outcome, Summary
-from ...results.table import ResultColumn, ResultTable
+from ...results.summary import METHODS_TABLE, Outcome, ResultColumn, ResultTable, Summary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

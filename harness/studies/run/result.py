@@ -14,8 +14,7 @@ from ...results.files import write_csv, write_csv_rows, write_signals
 from ...results.provenance import describe_sources
 from ...results.quantity import Quantity, format_number, step_size_quantities
 from ...results.result import Result
-from ...results.summary import MAX_DEVIATION, PICTURE_FILE, STEPS_TABLE, Outcome, Summary
-from ...results.table import ResultColumn, ResultTable
+from ...results.summary import MAX_DEVIATION, PICTURE_FILE, STEPS_TABLE, Outcome, ResultColumn, ResultTable, Summary
 from ...scenes.scene import MAX_DEFAULT_PLOTS, KnownValues, Scene, default_plots, is_panel
 from ...simulation.plot import choose_outputs, contact_of
 from ...simulation.trajectory import Trajectory, describe_accuracy, effective_parameters

@@ -13,7 +13,7 @@ from ...results.files import column_heading, write_csv, write_csv_rows
 from ...results.provenance import describe_sources
 from ...results.quantity import divide_units, format_number
 from ...results.result import Result
-from ...results.table import ResultColumn, ResultTable
+from ...results.summary import ResultColumn, ResultTable
 from ...scenes.run_spec import RunSpec
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from ...errors import check_names
 from ...references.reference_trajectory import CommunicationGrid
 from ...references.segments import ParameterSpan
 from ...results.result import Result
-from ...results.summary import Outcome, Summary
-from ...results.table import ResultColumn, ResultTable
+from ...results.summary import Outcome, ResultColumn, ResultTable, Summary
 from ...scenes.run_spec import RunSpec
 from ...simulation.trajectory import Trajectory
 
