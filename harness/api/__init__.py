@@ -3,15 +3,9 @@
 Each function imports what it needs when it is called, so that importing `harness` stays fast.
 """
 
-from .curves import identify_curve
-from .decay import identify_decay
-from .descriptions import describe
 from .fits import fit
-from .measures import measure
-from .records import read_record
-from .results import load_result
-from .runs import compare, simulate
-from .sensitivities import sensitivity
+from .records import identify_curve, identify_decay, measure, read_record
+from .runs import compare, describe, load_result, sensitivity, simulate
 from .sweeps import sweep
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Runs and comparisons from Python: `simulate` and `compare`."""
+"""Runs from Python: `simulate`, `compare` and `sensitivity`; `describe` and `load_result`, which run nothing."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -33,10 +33,13 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import ArrayLike
 
+    from ..results.result import Result
     from ..scenes.run_spec import RunSpec
+    from ..simulation.fmu_variables import FmuDescription
     from ..simulation.trajectory import Trajectory
     from ..studies.compare.result import ComparisonResult
     from ..studies.run.result import RunResult
+    from ..studies.sensitivity.result import SensitivityResult
 
 
 @check_arguments(
@@ -264,3 +267,149 @@ def to_finite_row(name: str, numbers: "ArrayLike") -> "np.ndarray":
         index = int(np.argmin(np.isfinite(row)))
         raise SceneError(f"{name} holds {row[index]} at index {index}: give finite numbers")
     return row
+
+
+@check_arguments(
+    source=PATH,
+    parameters=SOME_NAMES,
+    values=SETTINGS,
+    start=FINITE,
+    stop=FINITE,
+    times=INCREASING_ROW,
+    outputs=SOME_NAMES,
+    rtol=POSITIVE,
+    progress=PROGRESS,
+)
+@with_progress_bar
+def sensitivity(
+    source: "str | Path",
+    parameters: Sequence[str],
+    values: Mapping[str, float | str] | None = None,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    times: "ArrayLike | None" = None,
+    outputs: Sequence[str] | None = None,
+    rtol: float | None = None,
+    inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | xarray.Dataset | None" = None,
+    progress: Progress | bool | None = None,
+) -> "SensitivityResult":
+    """Run a model with the derivatives of its outputs by parameters, through stick, slip and other events.
+
+    Between events the variational equations are integrated, with the directional derivatives of the FMU; at an event
+    the derivatives jump, because the time of the event depends on the parameters.
+
+    Parameters
+    ----------
+    source : str or path
+        The name of a model, the path of an FMU, or the name or path of a scene. Of a Python FMU of this project the
+        native FMU of the same model is run. Any other FMU needs model exchange with directional derivatives.
+    parameters : sequence of str
+        Parameters, start values such as ``x0``, or inputs. Of an input with a signal in `inputs`, the parameter is the
+        factor of the signal.
+    values : mapping, optional
+        Parameters and start values by name, in the units of the FMU; enumerations by label or number.
+    start, stop : float, optional
+        Start and stop time in s; by default those of the source.
+    times : array_like, optional
+        Increasing times (n,) in s to record; by default 1001. The run stops at the last one unless `stop` is given.
+    outputs : sequence of str, optional
+        Real outputs and states to record; by default all Real outputs.
+    rtol : float, optional
+        Relative tolerance of the integration; 1e-11 by default.
+    inputs : mapping, DataFrame or Dataset, optional
+        Input signals as in `simulate`.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
+
+    Returns
+    -------
+    SensitivityResult
+        ``s.t``, ``s["x"]``, ``s["x", "k"]`` for dx/dk, and the events with the derivatives of their times. ``remarks``
+        names the times at which no derivative exists.
+
+    Raises
+    ------
+    SceneError
+        If the source or an argument is not valid.
+    HarnessError
+        If the FMU has no directional derivatives, or the run fails.
+
+    Examples
+    --------
+    >>> s = sensitivity("stickslip", ["mu_s", "k"], stop=8.0)  # doctest: +SKIP
+    >>> s["x", "k"][-1]  # doctest: +SKIP
+    """
+    from ..simulation.resolve import resolve
+    from ..studies.sensitivity.study import compute_sensitivity
+
+    spec = resolve(source)
+    spec = replace(
+        spec,
+        values={**spec.values, **(values or {})},
+        inputs=spec.inputs if inputs is None else read_input_columns(inputs),
+        start=spec.start if start is None else start,
+        stop=spec.stop if stop is None else stop,
+        times=spec.times if times is None else times,  # type: ignore[arg-type] # an array by its rule
+        outputs=() if outputs is None else tuple(outputs),
+        tolerance=rtol,
+    )
+    return compute_sensitivity(spec, parameters, reporter(progress))
+
+
+@check_arguments(source=PATH)
+def describe(source: "str | Path") -> "FmuDescription":
+    """List the variables of a model or an FMU: units, start values, ranges, friction laws, methods and defaults.
+
+    Parameters
+    ----------
+    source : str or path
+        The name of a model, or the path of any FMU, FMI 2.0 or 3.0. The FMU is read, not run.
+
+    Returns
+    -------
+    FmuDescription
+        Variables, laws, methods and defaults; printed as tables.
+
+    Raises
+    ------
+    SceneError
+        If there is no such model or file.
+    HarnessError
+        If the file is not an FMU.
+
+    Examples
+    --------
+    >>> describe("stickslip").methods  # doctest: +SKIP
+    ('exact', 'ode23', 'ode45', 'dop853', 'rodas')
+    """
+    from ..scenes.fmu_files import find_fmu
+    from ..simulation.fmu_variables import describe_fmu
+
+    return describe_fmu(find_fmu(str(source)))
+
+
+@check_arguments(folder=PATH)
+def load_result(folder: "str | Path") -> "Result":
+    """Read a stored result.
+
+    Parameters
+    ----------
+    folder : path
+        A result folder, as a command or `save` writes it.
+
+    Returns
+    -------
+    Result
+        The same class as from the function of Python: a `Trajectory`, `DecayResult`, `FitResult`, `Comparison` or
+        `SweepResult`; for other studies the class of their results.
+
+    Raises
+    ------
+    SceneError
+        If the folder holds no result, or it is damaged.
+    """
+    from ..results.registry import load
+
+    return load(Path(folder))

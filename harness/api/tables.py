@@ -215,8 +215,7 @@ def has_increasing_floats(index: Any) -> bool:
 
 def to_column(name: str, values: Any) -> "np.ndarray":
     """Return a column (n,), time deltas in the unit of its heading or in s; SceneError if they are no numbers."""
-    from ..records.headings import split_heading
-    from ..records.units import TIMES
+    from ..records.units import TIMES, split_heading
 
     try:
         column = to_array(values)
@@ -256,8 +255,7 @@ def convert_to_signals(source: Any) -> "Signals":
     import numpy as np
 
     from ..records.columns import ColumnOptions, find_column_and_unit, list_columns, parse_numbers
-    from ..records.headings import TIME_NAME
-    from ..records.units import TIMES
+    from ..records.units import TIME_NAME, TIMES
     from ..simulation.signals import Signals
 
     if is_signals(source):

@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import SceneError, option_text, unknown_name_message
-from .headings import DATE_NAME, TIME_NAME, order_from_name, split_heading
 from .samples import parse_timestamps
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
-from .units import TIMES, find_unit, time_unit_size
+from .units import DATE_NAME, TIME_NAME, TIMES, find_unit, order_from_name, split_heading, time_unit_size
 
 MAX_PLAUSIBLE_TIME = 1e11  # s: the year 5138
 EXPONENT = re.compile("[dD](?=[-+0-9])")  # Fortran

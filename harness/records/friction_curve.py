@@ -21,10 +21,9 @@ from .columns import (
     no_time_message,
 )
 from .extraction import Samples, Source, TimeAxis, extract, has_times
-from .headings import FORCE_NAME
 from .samples import mark_sentinels
 from .table_files import Table
-from .units import conversion_factor, find_unit, force_unit_size, is_force_unit, time_unit_size, unit_size
+from .units import FORCE_NAME, conversion_factor, find_unit, force_unit_size, is_force_unit, time_unit_size, unit_size
 
 FRICTION_NAME = re.compile(r"friction|reibung", re.I)
 CURRENT_NAME = re.compile(r"^(i|iq|current|strom)(?![^\W_])", re.I)

@@ -18,11 +18,19 @@ from .columns import (
     parse_numbers,
 )
 from .extraction import Source, extract, find_time_axis, has_times
-from .headings import FORCE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name
 from .motion import NO_UNIT, RATE_SUFFIXES, Motion, check_samples
 from .samples import leave_out_saturated
 from .table_files import Table
-from .units import COUNT_NAMES, find_unit, is_force_unit, split_count
+from .units import (
+    COUNT_NAMES,
+    FORCE_NAME,
+    MAGNITUDE_NAME,
+    TIME_NAME,
+    find_unit,
+    is_force_unit,
+    order_from_name,
+    split_count,
+)
 
 EXAMPLE_UNITS = (("mm", "deg"), ("mm/s", "deg/s"), ("m/s2", "g"))  # by the order of the derivative
 

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..errors import SceneError
 from . import size_limits
-from .headings import TIME_NAME, is_unit, order_from_name, split_heading
-from .units import COUNT_NAMES, time_unit_size, unit_size
+from .units import COUNT_NAMES, TIME_NAME, is_unit, order_from_name, split_heading, time_unit_size, unit_size
 
 DELIMITERS = ("\t", ";", ",", "|", " ")
 MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf", "\u221e", "-\u221e"}

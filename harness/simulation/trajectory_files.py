@@ -14,9 +14,8 @@ import numpy as np
 from ..errors import HarnessError, SceneError, first_line, format_value
 from ..records.child_reader import read_in_child
 from ..records.columns import read_numeric
-from ..records.headings import split_heading
 from ..records.table_files import read_content
-from ..records.units import TIMES
+from ..records.units import TIMES, split_heading
 from ..results.provenance import load_provenance
 from ..results.registry import load_summary
 from ..scenes.run_spec import RunSpec

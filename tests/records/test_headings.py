@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness import HarnessError, read_record
-from harness.records.headings import split_heading
+from harness.records.units import split_heading
 
 PIECES = ("x", "t", "time", "mm", "m/s^2", "(", ")", "[", "]", "/", " in ", " ", "\t", "_", "µ", "Run #1", "aB", ",")
 HEADINGS = st.lists(st.sampled_from(PIECES) | st.text(max_size=3), max_size=12).map("".join)

@@ -10,8 +10,8 @@ import pytest
 from decays import Signal, decay_record, identify
 
 from harness import HarnessError, SceneError, compare, read_record
-from harness.records.headings import split_heading
 from harness.records.text_table import parse_text_table
+from harness.records.units import split_heading
 
 T = np.arange(600) / 100
 TRUTH = {"omega": 12.566, "zeta": 0.01, "r": 0.002}
