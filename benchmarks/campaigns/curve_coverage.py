@@ -12,7 +12,7 @@ from collections import defaultdict
 import numpy as np
 
 import harness
-from harness.analyses.curve.laws import LAWS
+from harness.analyses.curve.law_fit import LAWS
 
 NAMES = ("F_c", "F_s", "v_s", "F_v", "bias")
 DRAWN = tuple(law for law in LAWS if law.name != "asymmetric-coulomb")  # which a bias replaces

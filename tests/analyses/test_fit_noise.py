@@ -9,7 +9,7 @@ from variants import slow_after
 
 from harness.analyses.fit.fit_problem import FitProblem, Unknown
 from harness.analyses.fit.fit_procedure import MeasuredRecord, subdivide_inputs
-from harness.analyses.fit.noise import correlation_length, estimate_noise, significant_correlation
+from harness.analyses.fit.measured_record import correlation_length, estimate_noise, significant_correlation
 from harness.records.extraction import Samples
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from ...arguments import TEXT, check_arguments
 from ...errors import HarnessError, SceneError, check_names, option_text
 from ..estimation.estimate import Estimate
-from .law_fit import LawFit, count_speeds, fit_law, linearise
-from .laws import LAWS, Law
+from .law_fit import LAWS, Law, LawFit, count_speeds, fit_law, linearise
 from .outliers import find_outliers
 from .points import CurvePoints, Effect, find_dependences
 

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from .law_fit import MIN_FREEDOM, LawFit, fit_law, linearise
-from .laws import Law
+from .law_fit import MIN_FREEDOM, Law, LawFit, fit_law, linearise
 from .points import CurvePoints, Effect
 
 SIGNIFICANCE = 0.001  # of all points together

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import SceneError
 from ...records.extraction import Samples
 from ...records.friction_curve import FORCE, POSITION, VELOCITY
-from ..estimation.noise import robust_std
+from ..estimation.estimate import robust_std
 from .identification import MIN_POINTS
 from .points import CurvePoints
 

@@ -16,10 +16,23 @@ from scipy import optimize
 from ...errors import HarnessError
 from ...records.motion import MIN_SAMPLES, Motion, selection_text
 from . import thresholds
-from .energy_loss import estimate_losses
-from .extrema import Extrema
-from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, R, Terms, unknown_indices
-from .return_map import MAX_HALF_CYCLES, iterate_return_map
+from .law import (
+    AMPLITUDE,
+    DRIFT,
+    MAX_HALF_CYCLES,
+    OMEGA,
+    REST,
+    T0,
+    TERMS,
+    UNKNOWNS,
+    ZETA,
+    R,
+    Terms,
+    estimate_losses,
+    iterate_return_map,
+    unknown_indices,
+)
+from .samples import Extrema
 from .signal_model import LAW, SignalModel
 
 Minimum = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the sum of squares

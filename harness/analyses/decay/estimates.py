@@ -19,7 +19,6 @@ from scipy import optimize
 from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from .decay_problem import DecayProblem, column_norms, least_squares
-from .extrema import Extrema
 from .intervals import FitUncertainty, confidence_interval, extend_interval, to_correlation
 from .law import (
     AMPLITUDE,
@@ -33,9 +32,10 @@ from .law import (
     R,
     damping_ratio,
     friction_from_envelope,
+    iterate_return_map,
 )
 from .model_selection import FittedLaw
-from .return_map import iterate_return_map
+from .samples import Extrema
 from .signal_model import LAW
 
 PRECISION = 1e-12  # relative to a small loss, of the single loss

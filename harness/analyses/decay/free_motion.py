@@ -11,12 +11,11 @@ from typing import Self
 import numpy as np
 
 from ...records.motion import MIN_SAMPLES, Motion
-from ..estimation.noise import robust_std
+from ..estimation.estimate import robust_std
 from . import thresholds
 from .decay_problem import DecayProblem, prepare_problem
-from .extrema import Extrema
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
-from .sample_noise import estimate_noise
+from .samples import Extrema, estimate_noise
 
 
 @dataclass(frozen=True)

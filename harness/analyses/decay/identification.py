@@ -1,18 +1,18 @@
 """Identification of damping, dry friction and drag from the record of a decay.
 
-1. Find the free decay within the record (window.py) and thin it (thinning.py); locate and number its turning points
-   (extrema.py).
-2. Estimate the losses from the energy lost per half cycle (energy_loss.py), then fit the numbered turning points.
+1. Find the free decay within the record (window.py) and thin it (samples.py); locate and number its turning points
+   (samples.py).
+2. Estimate the losses from the energy lost per half cycle (law.py), then fit the numbered turning points.
 3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
-5. Test the residuals against time (departures.py), and look for friction that rises at low speed
+5. Test the residuals against time (intervals.py), and look for friction that rises at low speed
    (low_speed_friction.py).
 6. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
 
 References
 ----------
 Steps 2 and 4 follow J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998), and Journal of Sound and Vibration 295
-(2006).  The return map (return_map.py), from which the whole signal is interpolated, is not in these papers.
+(2006).  The return map (law.py), from which the whole signal is interpolated, is not in these papers.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,6 @@ from ...errors import HarnessError, check_names, option_text
 from ...records.motion import NO_UNIT, RATE_SUFFIXES, Motion
 from ..estimation.estimate import Estimate
 from .decay_problem import DecayProblem, FitError
-from .energy_loss import EnergyLoss, loss_fractions
 from .estimates import (
     KnownParameters,
     estimate_from_extrema,
@@ -34,15 +33,13 @@ from .estimates import (
     force_estimates,
     make_estimates,
 )
-from .extrema import Extrema, find_extrema
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
-from .law import DRIFT, OMEGA, REST, TERMS, Terms
+from .law import DRIFT, OMEGA, REST, TERMS, EnergyLoss, Terms, loss_fractions
 from .low_speed_friction import LowSpeedRise, find_low_speed_rise, widen_losses
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import ambiguity_remark, check_fit, is_unreliable, make_remarks, rise_remark
-from .sample_noise import estimate_noise, remove_spikes
-from .thinning import block_size, thin, thinning_error
+from .samples import Extrema, block_size, estimate_noise, find_extrema, remove_spikes, thin, thinning_error
 from .window import select_decay
 
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from ..estimation.estimate import NORMAL_QUANTILE, Estimate
-from ..estimation.noise import block_scores
+from ..estimation.estimate import NORMAL_QUANTILE, Estimate, block_scores
 from . import thresholds
 from .decay_problem import DecayProblem, column_norms
 from .estimates import unit_scales

@@ -13,8 +13,7 @@ import numpy as np
 
 from . import thresholds
 from .decay_problem import DecayProblem, Minimum
-from .energy_loss import estimate_losses
-from .law import TERMS, ZETA, Terms, describe_law, sublaws
+from .law import TERMS, ZETA, Terms, describe_law, estimate_losses, sublaws
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, ZETA, B, R
-from .return_map import iterate_return_map
+from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, ZETA, B, R, iterate_return_map
 
 DERIVATIVE_TERMS = 0.75  # fraction of the terms of a series that suffices for a derivative
 LAW = np.array([AMPLITUDE, ZETA, R, B])  # the unknowns that half cycles depend on

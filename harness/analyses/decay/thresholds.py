@@ -4,7 +4,7 @@ They are in the order of the steps of identification.py.  Numbers of the numeric
 interpolation) are with the code that they belong to, because they decide about accuracy only.
 """
 
-# --- Noise of the samples (sample_noise.py) ---
+# --- Noise of the samples (samples.py) ---
 OUTLIER = 8.0  # times the noise: white noise exceeds it in one of 1e15 samples
 MIN_SPIKE = 0.02  # of the range: a smaller spike hides no turning point
 MAX_SPIKE_ROUNDS = 40  # each round removes the outermost samples of a run of outliers
@@ -13,7 +13,7 @@ COARSE_STEP = 1.5  # times the noise: a larger step between values comes from a 
 FINE_NOISE = 1 / 3  # of a step of the values: noise below it cannot be seen through the quantiser
 MIN_NOISE = 1e-13  # relative to the amplitude: no record is more precise than rounding
 
-# --- Smoothed position (smooth_motion.py) ---
+# --- Smoothed position (samples.py) ---
 MIN_REVERSAL = 8.0  # times the noise, in the record itself: no pair of noisy samples differs by as much
 MIN_REVERSALS = 4  # of the record itself that give its half period
 MIN_SMOOTH_REVERSAL = 18.0  # times the noise in the smoothed record, whose noise is correlated within the window
@@ -56,14 +56,14 @@ SMALL_BEFORE = 0.2  # of the first swing: smaller motions before it are a rest
 LARGE_AFTER = 1.2  # times the last swing: a larger one is another motion
 RIVAL = 0.5  # weight of another decay, relative to the selected one
 
-# --- Thinning (thinning.py) ---
+# --- Thinning (samples.py) ---
 MAX_DENSE_SAMPLES = 10_000  # a record with fewer samples is fitted as it is
 MIN_THINNED_SAMPLES = 5_000  # of a thinned record
 MIN_THINNED_PER_PERIOD = 64.0  # samples: their means differ by 1.3e-6 of the amplitude
 EVEN_INTERVALS = 1.05  # ratio of long to short intervals: with a larger one the times are uneven
 MAX_BLOCK_SPAN = 1.5  # times the median span of neighbouring blocks: a longer one has a gap
 
-# --- Turning points of the decay (extrema.py) ---
+# --- Turning points of the decay (samples.py) ---
 ENOUGH_TURNING_POINTS = 6  # a segment before a gap is used if it has as many
 MIN_NOISY_RANGE = 12.0  # times the noise: a record with a smaller range is all noise
 MIN_HALF_PERIOD = 0.5  # of the median: faster reversals are ringing of the smoothed copy at a release

@@ -14,8 +14,7 @@ import numpy as np
 from ...errors import HarnessError, command_text
 from ...records.motion import Motion, selection_text
 from . import thresholds
-from .sample_noise import estimate_noise, remove_spikes
-from .smooth_motion import are_regular, half_periods, smooth_segments
+from .samples import are_regular, estimate_noise, half_periods, remove_spikes, smooth_segments
 
 
 @dataclass(frozen=True)

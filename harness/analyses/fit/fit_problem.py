@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .feasible_region import FeasibleRegion
 from .measured_record import MeasuredRecord
-from .unknowns import DELAY, GAIN, OFFSET, Unknown
+from .unknowns import DELAY, GAIN, OFFSET, FeasibleRegion, Unknown
 
 EXACT_STEPS, ROUGH_STEPS = (1e-6, 1e-6), (1e-5, 1e-4)  # of one-sided and central differences
 ALL_STEPS = (EXACT_STEPS, (1e-5, 1e-5), ROUGH_STEPS)

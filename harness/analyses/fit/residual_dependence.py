@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import option_text
 from .fit_problem import FitProblem
-from .noise import correlation_length
+from .measured_record import correlation_length
 from .unknowns import DELAY, OFFSET
 
 EXPLAINED = 0.3  # share of the squares of the residuals from which a dependence is named

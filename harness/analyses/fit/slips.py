@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...records.extraction import Samples
-from ..estimation.noise import interpolation_residuals, robust_std
-from ..estimation.reversals import find_reversals
+from ..estimation.estimate import find_reversals, interpolation_residuals, robust_std
 from .parameter_fit import Slips
 
 FORCES = ("N", "N.m")

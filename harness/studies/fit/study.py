@@ -11,13 +11,11 @@ from pathlib import Path
 from time import process_time
 
 from ...analyses.estimation.estimate import ColumnResiduals
-from ...analyses.fit.fit_description import describe_fit
+from ...analyses.fit.fit_description import describe_fit, validate
 from ...analyses.fit.fit_procedure import fit_records
-from ...analyses.fit.law_comparison import compare_laws
-from ...analyses.fit.parameter_fit import ParameterFit
+from ...analyses.fit.parameter_fit import ParameterFit, compare_laws
 from ...analyses.fit.search import ROUGH
 from ...analyses.fit.slips import irregular_slips
-from ...analyses.fit.validation import validate
 from ...errors import HarnessError, SceneError, check_names, format_value, option_text
 from ...records.columns import ColumnOptions
 from ...records.extraction import Samples
