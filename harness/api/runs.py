@@ -410,6 +410,6 @@ def load_result(folder: "str | Path") -> "Result":
     SceneError
         If the folder holds no result, or it is damaged.
     """
-    from ..results.registry import load
+    from ..results.loading import load
 
     return load(Path(folder))

@@ -1,4 +1,4 @@
-"""Results of any study by their names: for `load_result`, result folders and the report.
+"""All studies, each stated once: for `load_result`, result folders and the report.
 
 A new study is a package in `harness/studies` with a class of results, a file in `harness/commands`, and an entry here.
 Classes are named by strings, because this module imports no study.
@@ -7,11 +7,12 @@ Classes are named by strings, because this module imports no study.
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ..errors import HarnessError, SceneError, format_value, unknown_name_message
-from .provenance import load_provenance
-from .result import Result
-from .summary import SUMMARY_FILE, Summary, read_summary
+from ..errors import SceneError, format_value, unknown_name_message
+
+if TYPE_CHECKING:
+    from .result import Result
 
 PICTURE = "figure.svg"
 
@@ -155,21 +156,3 @@ def study_of_folder(folder: Path) -> Study:
         files = ", ".join(dict.fromkeys(study.files[0] for study in STUDIES))
         raise SceneError(f"{format_value(str(folder))} holds no result: name a folder with one of {files}")
     return study
-
-
-def load(folder: Path) -> Result:
-    """Return the result in a folder; SceneError if there is none, or if it is damaged."""
-    summary = load_summary(folder)
-    kind = (find_study(summary.study) if summary else study_of_folder(folder)).result_class()
-    if not kind._is_stored(folder):
-        command = load_provenance(folder).get("command", "the command that wrote it")
-        raise SceneError(f"{folder} lacks the data of its result: run `{command}` again")
-    return kind._load(folder)
-
-
-def load_summary(folder: Path) -> Summary | None:
-    """Return the summary of a result; None if there is none that this version reads."""
-    try:
-        return read_summary(folder) if (folder / SUMMARY_FILE).is_file() else None
-    except HarnessError:
-        return None

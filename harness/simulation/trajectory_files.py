@@ -17,7 +17,7 @@ from ..records.columns import read_numeric
 from ..records.table_files import read_content
 from ..records.units import TIMES, split_heading
 from ..results.provenance import load_provenance
-from ..results.registry import load_summary
+from ..results.loading import load_summary
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import read_description
 from .model_data import read_model_data
