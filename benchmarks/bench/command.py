@@ -15,7 +15,7 @@ def bench(terminal: Terminal) -> None:
       python -m benchmarks bench
     """
     from . import study
-    from .table import benchmark_table
+    from .study import benchmark_table
 
     selected = study.all_benchmarks()
     with terminal.progress(len(selected)) as report:

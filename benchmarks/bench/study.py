@@ -1,6 +1,7 @@
-"""Runs the benchmarks and writes bench.csv."""
+"""The benchmarks, each with its target and its baselines: runs them, and writes and summarizes bench.csv."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from math import isnan
 from pathlib import Path
 
 from benchmarks import command_line
@@ -8,12 +9,82 @@ from harness.references.models import MODELS
 from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import prefix_parameters, write_provenance
-from harness.results.summary import write_summary
+from harness.results.summary import ResultColumn, ResultTable, Summary, SummaryTable, write_summary
 from harness.scenes.fmu_files import find_fmu
 from harness.simulation.fmu_archive import declared_parameters
 
-from .benchmark import Benchmark
-from .table import summarize_benchmarks
+from .benchmark import Baseline, Benchmark
+
+
+def benchmark_table(benchmarks: Sequence[Benchmark]) -> ResultTable:
+    """Return the table of measured values, targets and baselines."""
+    return ResultTable(
+        benchmarks,
+        (
+            ResultColumn("benchmark", "{0.name}", is_text=True),
+            ResultColumn("measured", lambda benchmark: format_quantity(benchmark.value, benchmark.unit)),
+            ResultColumn("target", lambda benchmark: format_quantity(benchmark.target, benchmark.unit)),
+            ResultColumn("verdict", judge, is_text=True),
+            ResultColumn("baseline", list_baselines, is_text=True),
+        ),
+    )
+
+
+def judge(benchmark: Benchmark) -> str:
+    """Return whether the target is met."""
+    return "met" if benchmark.is_met else "not measured" if isnan(benchmark.value) else "missed"
+
+
+def list_baselines(benchmark: Benchmark) -> str:
+    """Return the baselines, one a line."""
+    return "\n".join(format_baseline(benchmark, baseline) for baseline in benchmark.baselines)
+
+
+def format_baseline(benchmark: Benchmark, baseline: Baseline) -> str:
+    """Format a baseline with its ratio to the measured value."""
+    if baseline.value is None:
+        return baseline.name
+    ratio = "" if benchmark.unit == "1" or not benchmark.value else f", {baseline.value / benchmark.value:.3g} times"
+    return f"{baseline.name}: {format_quantity(baseline.value, 's')}{ratio}"
+
+
+def format_quantity(value: float, unit: str) -> str:
+    """Format a value with its unit, seconds with a prefix; NaN is empty."""
+    if isnan(value):
+        return ""
+    if unit == "s":
+        size, name = next((s, n) for s, n in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (0.0, "ns")) if value >= s)
+        return f"{value / (size or 1e-9):.3g} {name}"
+    return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
+
+
+def summarize_benchmarks(benchmarks: Iterable[Benchmark]) -> Summary:
+    """Return the summary: the missed targets, those that are met, and what was not measured."""
+    groups: dict[str, list[Benchmark]] = {"": [], "Targets that are met": [], "Not measured": []}
+    for benchmark in benchmarks:
+        title = "Not measured" if isnan(benchmark.value) else "Targets that are met" if benchmark.is_met else ""
+        groups[title].append(benchmark)
+    missed, met, _ = groups.values()
+    sentences = (f"{len(met)} of {len(met) + len(missed)} targets met.", *["Targets that are missed:"][: len(missed)])
+    headings = ("benchmark", "measured", "target", "unit", "baselines")
+    tables = tuple(
+        SummaryTable(headings, tuple(map(summary_row, rows)), title) for title, rows in groups.items() if rows
+    )
+    return Summary("bench", "Targets and measurements", sentences, tables)
+
+
+def summary_row(benchmark: Benchmark) -> tuple[str, ...]:
+    """Return the row of a benchmark, with two digits of what was measured."""
+    measured, target = (
+        "" if isnan(value) else f"{value:{digits}}"
+        for value, digits in ((benchmark.value, ".2g"), (benchmark.target, "g"))
+    )
+    baselines = "; ".join(
+        baseline.name if baseline.value is None else f"{baseline.name} {baseline.value:.2g}"
+        for baseline in benchmark.baselines
+    )
+    return benchmark.name, measured, target, "" if benchmark.unit == "1" else benchmark.unit, baselines
+
 
 FOLDER, FILE = "bench", "bench.csv"
 

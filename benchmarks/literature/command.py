@@ -14,8 +14,7 @@ def literature(terminal: Terminal) -> None:
     Example:
       python -m benchmarks literature
     """
-    from .study import RESULT_FOLDER, run_literature
-    from .table import literature_table
+    from .study import RESULT_FOLDER, literature_table, run_literature
 
     runs = run_literature(terminal.out)
     terminal.print_result(runs, literature_table(runs), folder=terminal.out / RESULT_FOLDER)

@@ -1,19 +1,12 @@
 """Problems from the literature, solved by the runtime; the first two by peer solvers, too.
 
-1. Block on a belt with friction that decreases with the relative speed (R. I. Leine, Bifurcations in Discontinuous
-   Mechanical Systems of Filippov-Type, 2000).
-2. Chattering: friction so strong that the mass stops for good within half a second.  With sign(v) no solver finishes;
-   with modes it is a single event.
-3. Stick-slip in closed form (E. Rabinowicz, Friction and Wear of Materials, chapter 4).
-4. Stick-slip with LuGre friction, a stiff problem with a kink (C. Canudas de Wit et al., 1995).
-5. Steady forced motion, with and without stops (J. P. Den Hartog, 1931).
-6. Two sleds in a row, each with stick and slip.
+They are an oscillator that chatters, and a block on a belt.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import partial
-from math import pi, sqrt
+from math import atan, copysign, fabs, pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -23,16 +16,71 @@ from benchmarks.references.den_hartog import SteadyMotion, steady_motion_with_st
 from harness.errors import HarnessError
 from harness.references import peer_solvers
 from harness.references.certified_reference import FOLDER, load_reference
-from harness.references.ode_problem import OdeProblem
+from harness.references.models.coulomb import CoulombProblem
+from harness.references.ode_problem import JacobianFunction, OdeProblem, RhsFunction
 from harness.results.files import column_heading, write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import write_provenance
-from harness.results.summary import Summary, SummaryTable, write_summary
+from harness.results.quantity import format_power
+from harness.results.summary import ResultColumn, ResultTable, Summary, SummaryTable, write_summary
 from harness.scenes.fmu_files import find_fmu
 from harness.simulation.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
 from harness.simulation.solution import Solution
 
-from .problems import BeltBlock, ChatteringOscillator, ChatteringOscillatorSign, SmoothedBeltBlock
+
+class ChatteringOscillator(CoulombProblem):
+    """Classic chattering problem: strong friction stops the mass within half a second and holds it."""
+
+    start, stop = (0.0, 5.0), 10.0 * pi
+    m, k, f = 1.0, 1.0, 10.0
+
+
+class ChatteringOscillatorSign(ChatteringOscillator):
+    """The same problem with sign(v): one equation without modes, in which the mass never stops."""
+
+    has_dry_friction = False
+
+    def rates(self, mode: int) -> RhsFunction:
+        return lambda t, y: (y[1], -y[0] - (copysign(10.0, y[1]) if y[1] else 0.0))
+
+    jacobian = OdeProblem.jacobian
+
+
+class BeltBlock(OdeProblem):
+    """Block on a belt (R. I. Leine, Bifurcations in Discontinuous Mechanical Systems of Filippov-Type, 2000).
+
+    m = k = F_s = 1 in SI units.  In the frame of the belt, y = x - 0.2 t, the block sticks where its velocity is zero:
+
+    y'' = -(y + 0.2 t) - sign(v)/(1 + 3 |v|),    stuck while |y + 0.2 t| <= 1
+    """
+
+    start, stop, has_dry_friction = (1.067, -0.2), 50.0, True
+
+    def rates(self, mode: int) -> RhsFunction:
+        return lambda t, y: (y[1], -(y[0] + 0.2 * t) - mode / (1 + 3 * mode * y[1]))
+
+    def jacobian(self, mode: int) -> JacobianFunction | None:
+        return lambda t, y: [[0.0, 1.0], [-1.0, 3 / (1 + 3 * mode * y[1]) ** 2]]
+
+    def static_load(self, t: float, x: float) -> tuple[float, float, float]:
+        return -(x + 0.2 * t), -0.2, 1.0
+
+
+class SmoothedBeltBlock(BeltBlock):
+    """Block on a belt with friction smoothed to a steep arctan: it creeps where it should stick."""
+
+    has_dry_friction = False
+    steepness = 1e6  # s/m
+
+    def rates(self, mode: int) -> RhsFunction:
+        share, steepness = 2 / pi, self.steepness
+        return lambda t, y: (
+            y[1],
+            -(y[0] + 0.2 * t) - share * atan(steepness * y[1]) / (1 + 3 * fabs(y[1])),
+        )
+
+    jacobian = OdeProblem.jacobian
+
 
 RESULT_FOLDER, FILE = Path("precision") / "literature", "final-errors.csv"  # beside the results of precision
 UNITS = {"rtol": "1", "error": "SI"}  # of columns; SI means m and m/s
@@ -160,3 +208,18 @@ def make_run(
     except HarnessError as error:
         return begin(None, float("nan"), str(error))
     return begin(answer.evaluations, float(np.abs(answer.states[-1] - end).max()))
+
+
+COLUMNS = (
+    ResultColumn("solver", "{0.solver}", is_text=True),
+    ResultColumn("method", "{0.method}", is_text=True),
+    ResultColumn("rtol", lambda run: format_power(run.rtol)),
+    ResultColumn("calls", lambda run: "-" if run.evaluations is None else str(run.evaluations)),
+    ResultColumn("error [SI]", lambda run: run.failure or f"{run.error:.1e}"),
+)
+
+
+def literature_table(runs: Sequence[LiteratureRun]) -> ResultTable:
+    """Return the table of literature problems."""
+    title = "problems from the literature: right-hand side calls and final error"
+    return ResultTable(runs, COLUMNS, title, group=lambda run: (run.problem,))

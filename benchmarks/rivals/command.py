@@ -30,7 +30,7 @@ def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:
     """
     from . import study
     from .catalogue import find_rivals
-    from .table import rivals_table, summary_lines
+    from .comparison import rivals_table, summary_lines
 
     with terminal.progress(len(find_rivals(names)) + 1) as report:
         comparison = study.run_rivals(names, timeout, terminal.out, report)

@@ -17,7 +17,7 @@ from math import cos, inf, pi, sin
 
 import numpy as np
 
-from benchmarks.literature.problems import BeltBlock
+from benchmarks.literature.study import BeltBlock
 from harness.references.models.coulomb import CoulombProblem
 from harness.references.models.pendulum import PendulumProblem
 from harness.references.models.stickslip import StickslipProblem

@@ -16,12 +16,11 @@ from harness.simulation.solution import Solution
 
 from .catalogue import Rival, find_rivals
 from .child import RivalCase, RivalReply, run_case
-from .comparison import Comparison, Result, format_setting
+from .comparison import Comparison, Result, format_setting, rivals_table, summary_lines
 from .figure import draw
 from .measures import measure
 from .reference_motions import compute_reference_motion
 from .scenes import SCENES
-from .table import rivals_table, summary_lines
 
 FOLDER, FILE, FIGURE = "rivals", "rivals.csv", "figure.svg"
 OWN_MODELS = ("coulomb", "stickslip", "belt", "clutch", "pendulum")

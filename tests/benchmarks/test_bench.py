@@ -27,8 +27,7 @@ from benchmarks.bench.accuracy import (
 )
 from benchmarks.bench.benchmark import Baseline, Benchmark
 from benchmarks.bench.speed import time_communication_step, time_in_process, time_many_runs, time_one_step
-from benchmarks.bench.study import FILE, FOLDER, all_benchmarks, run_benchmarks
-from benchmarks.bench.table import benchmark_table, format_baseline
+from benchmarks.bench.study import FILE, FOLDER, all_benchmarks, benchmark_table, format_baseline, run_benchmarks
 from harness import HarnessError
 from harness.scenes.run_spec import RunSpec
 

@@ -9,16 +9,14 @@ from rich.console import Console
 
 from benchmarks.__main__ import main
 from benchmarks.bench.benchmark import Baseline, Benchmark
-from benchmarks.bench.table import benchmark_table
+from benchmarks.bench.study import benchmark_table
 from benchmarks.importers import table
 from benchmarks.importers.checks import CHECKS
-from benchmarks.literature.study import LiteratureRun
-from benchmarks.literature.table import literature_table
+from benchmarks.literature.study import LiteratureRun, literature_table
 from benchmarks.rivals.catalogue import RIVALS
-from benchmarks.rivals.comparison import Comparison, Result
+from benchmarks.rivals.comparison import Comparison, Result, rivals_table
 from benchmarks.rivals.measures import Measures
 from benchmarks.rivals.scenes import SCENES
-from benchmarks.rivals.table import rivals_table
 from harness import HarnessError
 
 WIDTH = 80

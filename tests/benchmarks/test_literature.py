@@ -7,7 +7,7 @@ import pytest
 from models import model_class
 
 from benchmarks.literature import study
-from benchmarks.literature.problems import (
+from benchmarks.literature.study import (
     BeltBlock,
     ChatteringOscillator,
     ChatteringOscillatorSign,

@@ -14,12 +14,11 @@ from build_cache import build_once
 from benchmarks.rivals import child, study
 from benchmarks.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN, RIVALS, count_lines
 from benchmarks.rivals.child import RivalCase, RivalReply, run_case
-from benchmarks.rivals.comparison import Comparison, Result
+from benchmarks.rivals.comparison import Comparison, Result, exact_rivals, gap_lines, rivals_table
 from benchmarks.rivals.measures import match_events, measure
 from benchmarks.rivals.reference_motions import FINE, compute_reference_motion
 from benchmarks.rivals.scenes import SCENES, Solution, slip_changes
 from benchmarks.rivals.study import run_in_child
-from benchmarks.rivals.table import exact_rivals, gap_lines, rivals_table
 from harness.references.certified_reference import FOLDER, load_reference
 
 CERTIFIED = {"sled": "stickslip", "belt": "more/belt", "pendulum": "pendulum"}  # whole runs have certified files

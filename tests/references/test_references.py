@@ -13,7 +13,7 @@ from independent_solution import ClosedFormMotion, LinearSegment
 from mpmath import mpf
 from PIL import Image
 
-from benchmarks.literature.problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
+from benchmarks.literature.study import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
 from benchmarks.references import event_located
 from benchmarks.references.generation import CLOSED_FORMS, evaluate_closed_form
 from benchmarks.references.icon import draw_missing_icon

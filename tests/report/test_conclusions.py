@@ -12,7 +12,7 @@ from build_cache import ROOT
 from precision_points import make_point, make_study
 
 from benchmarks.bench.benchmark import Baseline, Benchmark
-from benchmarks.bench.table import summarize_benchmarks
+from benchmarks.bench.study import summarize_benchmarks
 from harness import StabilityResult
 from harness.references.peer_solvers import FMPY
 from harness.studies.precision.study import QUICK
