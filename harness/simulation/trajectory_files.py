@@ -16,8 +16,8 @@ from ..records.child_reader import read_in_child
 from ..records.columns import read_numeric
 from ..records.table_files import read_content
 from ..records.units import TIMES, split_heading
-from ..results.provenance import load_provenance
 from ..results.loading import load_summary
+from ..results.provenance import load_provenance
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import read_description
 from .model_data import read_model_data
