@@ -10,12 +10,12 @@ from build_cache import ROOT
 ALLOWED = """
 .: __main__ commands
 analyses.decay: decay_problem decrement intervals signal_model
-analyses.fit: fit_problem fit_procedure noise profile_likelihood
+analyses.fit: fit_problem fit_procedure measured_record profile_likelihood
 analyses: slip
 process: interrupt interruptible_wait subprocess_runner temporary_directory worker
-records: columns extraction headings record samples size_limits text_table
+records: columns extraction record samples size_limits text_table units
 references: certified_reference models peer_solvers reference_trajectory
-results: folder quantity registry style table
+results: folder quantity registry style summary
 simulation: embedded_model native_equivalent runner whole_run
 simulation.external: step_refinement
 scenes: run_spec
