@@ -228,7 +228,7 @@ def identify_decay(
             raise SceneError(f"{name} = {heading!r} has no effect on arrays, which have no headings: leave it out")
     motion = find_record(record, columns).motion
     parameters = KnownParameters(k, mass, pendulum)
-    if hasattr(record, "parameters") and parameters == KnownParameters():  # a Trajectory
+    if is_signals(record) and hasattr(record, "parameters") and parameters == KnownParameters():  # a Trajectory
         parameters = read_parameters(record)  # type: ignore[arg-type]
     return DecayResult(**vars(fit_decay(motion, parameters, drag, drift, reporter(progress))))
 
