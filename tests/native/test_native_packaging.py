@@ -340,13 +340,15 @@ def test_the_c_files_are_part_of_the_package():
 def test_the_compiler_cache_works_without_a_home_and_stays_clean(monkeypatch):
     outputs = {}
 
-    def run(command, **options):
+    def start(command, **options):
         outputs.update(options["env"])
-        return subprocess.CompletedProcess(command, 1, "", "")
+        return start_process([sys.executable, "-c", "raise SystemExit(1)"], **options)
+
+    start_process = subprocess.Popen
 
     for name in ("HOME", "ZIG_LOCAL_CACHE_DIR"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("fmus.packaging.native.binaries.subprocess.run", run)
+    monkeypatch.setattr("fmus.packaging.native.binaries.subprocess.Popen", start)
     with pytest.raises(BuildError, match=r"a.so does not compile"):
         compile_and_link({}, "a.c", "x86_64-linux-gnu.2.17", "a.so", ())
     assert Path(outputs["HOME"]).is_dir()

@@ -25,12 +25,12 @@ def build_native_fmus():
 
 @cache
 def build_for_all_platforms():
-    """Return the folder with a native FMU of smd for every platform, with one method, because only the platforms
-    matter here."""
+    """Return the folder with a native FMU of smd for every platform, as users build it but with one method, because
+    only the platforms matter here."""
     require_compiler()
     options = ("smd", "--native", "--method", "exact")
     return build_cache.build_once(
-        "everywhere", *options, *(word for item in PLATFORMS for word in ("--platform", item))
+        "everywhere", *options, *(word for item in PLATFORMS for word in ("--platform", item)), optimised=True
     )
 
 
