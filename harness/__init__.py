@@ -35,7 +35,9 @@ from .api import (
     identify_curve,
     identify_decay,
     load_result,
+    map_motions,
     measure,
+    orbit,
     read_record,
     sensitivity,
     simulate,
@@ -57,6 +59,9 @@ if TYPE_CHECKING:
     from .studies.curve.result import CurveResult
     from .studies.decay.result import DecayResult
     from .studies.fit.result import FitResult
+    from .studies.motion_map.result import Edge, MapResult
+    from .studies.orbit.motions import Motion, SpecialPoint
+    from .studies.orbit.result import OrbitResult
     from .studies.precision.result import PrecisionResult
     from .studies.run.result import RunResult
     from .studies.sensitivity.result import SensitivityEvent, SensitivityResult
@@ -73,11 +78,15 @@ __all__ = [
     "CurveResult",
     "DecayIdentification",
     "DecayResult",
+    "Edge",
     "FitResult",
     "FmuDescription",
     "HarnessError",
+    "MapResult",
     "ModeChanges",
+    "Motion",
     "MotionMeasures",
+    "OrbitResult",
     "ParameterFit",
     "PrecisionResult",
     "Record",
@@ -86,6 +95,7 @@ __all__ = [
     "SensitivityEvent",
     "SensitivityResult",
     "Signals",
+    "SpecialPoint",
     "StabilityResult",
     "SweepResult",
     "Trajectory",
@@ -96,7 +106,9 @@ __all__ = [
     "identify_curve",
     "identify_decay",
     "load_result",
+    "map_motions",
     "measure",
+    "orbit",
     "read_record",
     "sensitivity",
     "simulate",
@@ -115,6 +127,11 @@ TYPES = {
     "DecayResult": "harness.studies.decay.result",
     "ModeChanges": "harness.simulation.signals",
     "MotionMeasures": "harness.analyses.motion",
+    "Edge": "harness.studies.motion_map.result",
+    "MapResult": "harness.studies.motion_map.result",
+    "Motion": "harness.studies.orbit.motions",
+    "OrbitResult": "harness.studies.orbit.result",
+    "SpecialPoint": "harness.studies.orbit.motions",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
     "PrecisionResult": "harness.studies.precision.result",
     "Record": "harness.records.record",

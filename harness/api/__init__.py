@@ -4,6 +4,7 @@ Each function imports what it needs when it is called, so that importing `harnes
 """
 
 from .fits import fit
+from .orbits import map_motions, orbit
 from .records import identify_curve, identify_decay, measure, read_record
 from .runs import compare, describe, load_result, sensitivity, simulate
 from .sweeps import sweep
@@ -15,7 +16,9 @@ __all__ = [
     "identify_curve",
     "identify_decay",
     "load_result",
+    "map_motions",
     "measure",
+    "orbit",
     "read_record",
     "sensitivity",
     "simulate",

@@ -116,6 +116,22 @@ STUDIES = (
         "Derivatives of outputs by parameters, through stick and slip.",
     ),
     Study(
+        "orbit",
+        "orbit",
+        "studies.orbit.result:OrbitResult",
+        ("motions.csv", "points.csv", PICTURE),
+        "Periodic motions",
+        "Steady sliding and periodic motions, their stability, and the values at which they begin, end or change it.",
+    ),
+    Study(
+        "map",
+        "map",
+        "studies.motion_map.result:MapResult",
+        ("map.csv", "edges.csv", PICTURE),
+        "Maps of motions",
+        "What motions end in over one or two parameters, with the edges between the regions.",
+    ),
+    Study(
         "precision",
         "precision",
         "studies.precision.result:PrecisionResult",

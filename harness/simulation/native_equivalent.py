@@ -1,20 +1,27 @@
 """Native FMU of the model of a Python FMU, built on demand."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import fmpy
 import numpy as np
 
+from ..errors import HarnessError, SceneError, format_value
 from ..process.subprocess_runner import SubprocessTimeoutError, run_module
 from ..process.temporary_directory import temporary_directory
-from ..scenes.fmu_files import FOLDERS
+from ..scenes.fmu_files import FOLDERS, check_built
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import PROCESS_RESOURCES, default_stop, is_python_fmu, read_description, unpack_once
+from .fmu_variables import LAW
+from .model_data import read_model_data
 from .mtime_cache import cached_by_mtime
+from .variable_values import enumeration_labels
+from .variational import has_derivatives
 from .whole_run import open_simulator, real_variables
 
 BUILD_TIMEOUT = 300.0  # s
+HYBRID = "hybrid"  # the friction law with events
 COMPARED_POINTS, AGREEMENT = 51, 1e-6  # of the run by which two FMUs are compared
 
 
@@ -43,6 +50,34 @@ def native_equivalent(fmu: Path) -> Path:
         return fmu
     native_fmu = folder / fmu.name
     return native_fmu if not build.returncode and native_fmu.is_file() and is_same_model(fmu, native_fmu) else fmu
+
+
+def native_with_derivatives(fmu: Path) -> Path:
+    """Return the native FMU of the same model, which must have directional derivatives.
+
+    Raises
+    ------
+    HarnessError
+        If it has none for model exchange.
+    """
+    check_built(fmu, SceneError)
+    fmu = native_equivalent(fmu)
+    if not has_derivatives(unpack_once(fmu)):
+        raise HarnessError(
+            f"{fmu.name} has no directional derivatives for model exchange; native FMUs of this project have them: "
+            "build one with `friction-fmus build --native`"
+        )
+    return fmu
+
+
+def check_has_events(fmu: Path, variables: Mapping[str, Any], values: Mapping[str, Any]) -> None:
+    """Raise HarnessError for a friction law that has no events, and so no derivatives."""
+    label = read_model_data(fmu).fixed_choices.get(LAW, (HYBRID, 0))[0]
+    if LAW in variables:
+        label = enumeration_labels(variables[LAW])[int(values.get(LAW, variables[LAW].start))]
+    if label != HYBRID:
+        reason = "its solution chatters, and has no derivatives"
+        raise HarnessError(f"{LAW} = {format_value(label)}: {reason}; choose {HYBRID!r}")
 
 
 def is_same_model(fmu: Path, other: Path) -> bool:

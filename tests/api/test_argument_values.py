@@ -91,6 +91,8 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "lenient": FLAG,
         "progress": {"type"},
     },
+    "orbit": {"values": {"{}"}, "progress": {"type"}},
+    "map_motions": {"values": {"{}"}, "progress": {"type"}},
     "load_result": {},
     "measure": {"unit": {"'x'", "'8'", "long text"}},
     "read_record": {

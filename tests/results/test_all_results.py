@@ -71,6 +71,14 @@ def differentiated_sled():
     return harness.sensitivity(build_native_fmus() / "stickslip.fmu", ["mu_s", "k"], stop=6.0)
 
 
+def moving_sled():
+    return harness.orbit(build_native_fmus() / "stickslip.fmu", {"mu_d": 0.8})
+
+
+def mapped_sled():
+    return harness.map_motions(build_native_fmus() / "stickslip.fmu", {"mu_d": [0.6, 0.9], "k": [700.0, 800.0]})
+
+
 def measured_precision():
     """Points of one case by two methods, one of which failed once."""
     case = PrecisionCase("smd", "linear", {"k": 100.0})
@@ -104,6 +112,8 @@ MAKERS = {
     "sweep": swept_parameters,
     "compare": compared_runs,
     "sensitivity": differentiated_sled,
+    "orbit": moving_sled,
+    "map": mapped_sled,
     "precision": measured_precision,
     "stability": judged_cases,
 }

@@ -74,6 +74,8 @@ CALLS = {  # valid arguments, in which one is replaced
     "fit": {"source": "smd", "records": RECORD, "free": {"k": (20.0, 60.0)}, "values": {"c": 0.2, "x0": 1.0}},
     "sweep": {"source": "coulomb", "grid": {"f": [0.5]}, "stop": 0.2},
     "sensitivity": {"source": "native/coulomb.fmu", "parameters": "f", "stop": 0.2},
+    "orbit": {"source": "native/coulomb.fmu", "values": {"k": 100.0}},
+    "map_motions": {"source": "native/coulomb.fmu", "over": {"k": [90.0, 100.0]}},
     "load_result": {"folder": "result"},
     "measure": {"t": T, "x": X, "v": X, "unit": "m"},
     "read_record": {"source": Path(__file__).parents[2] / "docs/records/spring.csv"},

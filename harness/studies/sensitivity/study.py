@@ -7,25 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError, check_names, format_value
+from ...errors import HarnessError, SceneError, check_names
 from ...process.worker import WorkerDiedError, WorkerTimeoutError, call_once
-from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
 from ...simulation.array_elements import is_own
 from ...simulation.external.simulation import convert_values
 from ...simulation.fmu_archive import read_description, resolve_time_span, unpack_once
 from ...simulation.fmu_instance import capture_stderr
-from ...simulation.fmu_variables import LAW
 from ...simulation.model_data import read_model_data
-from ...simulation.native_equivalent import native_equivalent
+from ...simulation.native_equivalent import check_has_events, native_with_derivatives
 from ...simulation.session import resolve_settings
 from ...simulation.stepping import TIME, check_inputs, check_rates
-from ...simulation.variable_values import REAL_TYPES, effective_value, enumeration_labels, variable_unit
-from ...simulation.variational import DEFAULT_RTOL, VariationalSolution, differentiate, has_derivatives, state_variables
+from ...simulation.variable_values import REAL_TYPES, effective_value, variable_unit
+from ...simulation.variational import DEFAULT_RTOL, VariationalSolution, differentiate, state_variables
 from .result import SensitivityEvent, SensitivityResult
 
 DEFAULT_POINTS = 1001  # recorded times
-HYBRID = "hybrid"  # the friction law with events
 
 
 def compute_sensitivity(
@@ -49,7 +46,7 @@ def compute_sensitivity(
     HarnessError
         If the FMU has no directional derivatives, or the run fails.
     """
-    source, spec = spec, replace(spec, fmu=find_native(spec))
+    source, spec = spec, replace(spec, fmu=native_with_derivatives(spec.fmu))
     description = read_description(spec.fmu, spec.lenient)
     variables = {variable.name: variable for variable in description.modelVariables}
     start, stop = resolve_time_span(spec, description)
@@ -62,7 +59,7 @@ def compute_sensitivity(
     outputs = choose_outputs(description, parameters, spec.outputs)
     if is_own(description):
         values = {variable.name: value for variable, value in resolve_settings(spec, variables)}
-        check_law(spec, variables, values)
+        check_has_events(spec.fmu, variables, values)
     else:
         values = convert_values(spec, variables)
     tolerance = spec.tolerance or DEFAULT_RTOL
@@ -90,24 +87,6 @@ def compute_sensitivity(
     )
 
 
-def find_native(spec: RunSpec) -> Path:
-    """Return the native FMU of the same model.
-
-    Raises
-    ------
-    HarnessError
-        If it has no directional derivatives for model exchange.
-    """
-    check_built(spec.fmu, SceneError)
-    fmu = native_equivalent(spec.fmu)
-    if not has_derivatives(unpack_once(fmu)):
-        raise HarnessError(
-            f"{fmu.name} has no directional derivatives for model exchange; native FMUs of this project have them: "
-            "build one with `friction-fmus build --native`"
-        )
-    return fmu
-
-
 def choose_outputs(description: Any, parameters: Sequence[str], outputs: Sequence[str]) -> tuple[str, ...]:
     """Check the names of parameters and outputs; return the outputs, all Reals by default."""
     states = [state.name for state in state_variables(description)]
@@ -118,16 +97,6 @@ def choose_outputs(description: Any, parameters: Sequence[str], outputs: Sequenc
     declared = [item.name for item in reals if item.causality == "output"]
     check_names("output", outputs, [*declared, *(name for name in states if name not in declared)])
     return tuple(outputs or declared)
-
-
-def check_law(spec: RunSpec, variables: dict[str, Any], values: dict[str, Any]) -> None:
-    """Raise HarnessError for a friction law that has no events, and so no derivatives."""
-    label = read_model_data(spec.fmu).fixed_choices.get(LAW, (HYBRID, 0))[0]
-    if LAW in variables:
-        label = enumeration_labels(variables[LAW])[int(values.get(LAW, variables[LAW].start))]
-    if label != HYBRID:
-        reason = "its solution chatters, and has no derivatives"
-        raise HarnessError(f"{LAW} = {format_value(label)}: {reason}; choose {HYBRID!r}")
 
 
 def run_isolated(

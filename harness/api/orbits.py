@@ -1,0 +1,148 @@
+"""Periodic motions from Python: `orbit` and `map_motions`."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..arguments import INCREASING_ROW, PATH, PROGRESS, SETTINGS, WORKERS, Progress, check_arguments, mapping
+from ..errors import SceneError
+from .options import reporter, with_progress_bar
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike
+
+    from ..scenes.run_spec import RunSpec
+    from ..studies.motion_map.result import MapResult
+    from ..studies.orbit.result import OrbitResult
+
+OVER = mapping(INCREASING_ROW, "rows of increasing numbers")
+DEFAULT_VALUES, DEFAULT_GRID = 61, 21  # values of a parameter of which only the ends are given: orbit, map
+
+
+@check_arguments(source=PATH, values=SETTINGS, over=OVER, progress=PROGRESS)
+@with_progress_bar
+def orbit(
+    source: "str | Path",
+    values: Mapping[str, float | str] | None = None,
+    *,
+    over: "Mapping[str, ArrayLike] | None" = None,
+    progress: Progress | bool | None = None,
+) -> "OrbitResult":
+    """Find the steady sliding and the periodic motions of a model, stable and unstable ones, over a parameter.
+
+    An orbit that sticks is exact after one cycle; any other is found by Newton's method, with the derivatives of the
+    motion through all events. Around steady sliding of one body, all orbits that do not stick are sought. Between the
+    values of a parameter, the points are located at which motions begin, end or change their stability.
+
+    Parameters
+    ----------
+    source : str or path
+        The name of a model, the path of an FMU, or the name or path of a scene. Of a Python FMU of this project the
+        native FMU of the same model is run.
+    values : mapping, optional
+        Parameters and start values by name, in the units of the FMU; enumerations by label or number.
+    over : mapping, optional
+        A parameter and its increasing values (n,); its two ends for 61 values.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
+
+    Returns
+    -------
+    OrbitResult
+        ``r.motions`` with period, amplitude, stability and Floquet multipliers, and ``r.points``, the special points.
+
+    Raises
+    ------
+    SceneError
+        If the source or an argument is not valid.
+    HarnessError
+        If the FMU is not native, or cannot start from given states.
+
+    Examples
+    --------
+    >>> r = orbit("belt", {"c": 0.1}, over={"v_belt": (0.05, 3.4)})  # doctest: +SKIP
+    >>> [(point.value, point.kind) for point in r.points]  # doctest: +SKIP
+    """
+    from ..studies.orbit.study import compute_orbits
+
+    if over is not None and len(over) != 1:
+        raise SceneError(f"over has {len(over)} parameters: give one, as in {{'v_belt': (0.1, 3)}}")
+    axes = expand_axes(over or {}, DEFAULT_VALUES)
+    name, row = next(iter(axes.items()), ("", ()))
+    return compute_orbits(resolve_motion(source, values), name, [*map(float, row)], reporter(progress))
+
+
+@check_arguments(source=PATH, over=OVER, values=SETTINGS, workers=WORKERS, progress=PROGRESS)
+@with_progress_bar
+def map_motions(
+    source: "str | Path",
+    over: "Mapping[str, ArrayLike]",
+    values: Mapping[str, float | str] | None = None,
+    *,
+    workers: int | None = None,
+    progress: Progress | bool | None = None,
+) -> "MapResult":
+    """Map what the motions of a model end in over one or two parameters, with exact edges between the regions.
+
+    Of one body that slides steadily, the map says whether steady sliding is stable, and whether a motion that has stuck
+    sticks again: where both hold, the start decides. Of any other model it says what the motion from its start ends in,
+    with the number of sticks in a period. Edges are found by bisection along the lines of the grid.
+
+    Parameters
+    ----------
+    source, values
+        As in `orbit`.
+    over : mapping
+        One or two parameters and their increasing values (n,); two ends for 21 values.
+    workers : int, optional
+        Number of worker processes; by default all runs are done in this process, and by the command in one process for
+        each processor.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
+
+    Returns
+    -------
+    MapResult
+        ``m.labels`` of the points of the grid, and ``m.edges``.
+
+    Raises
+    ------
+    SceneError
+        If the source or an argument is not valid.
+    HarnessError
+        If the FMU is not native, or cannot start from given states.
+
+    Examples
+    --------
+    >>> m = map_motions("belt", {"v_belt": (0.3, 8), "c": (0.03, 0.6)})  # doctest: +SKIP
+    >>> [edge.point for edge in m.edges if edge.above == "steady sliding"]  # doctest: +SKIP
+    """
+    from ..studies.motion_map.study import compute_map
+
+    if len(over) not in (1, 2):
+        raise SceneError(f"over has {len(over)} parameters: give one or two, as in {{'v_belt': (0.1, 3)}}")
+    axes = expand_axes(over, DEFAULT_GRID)
+    return compute_map(resolve_motion(source, values), axes, workers, reporter(progress))
+
+
+def resolve_motion(source: "str | Path", values: Mapping[str, float | str] | None) -> "RunSpec":
+    """Return the run of a source with values."""
+    from ..simulation.resolve import resolve
+
+    spec = resolve(source)
+    return replace(spec, values={**spec.values, **(values or {})})
+
+
+def expand_axes(over: "Mapping[str, ArrayLike]", count: int) -> "dict[str, np.ndarray]":
+    """Return the values of each parameter; `count` values between two ends."""
+    import numpy as np
+
+    axes = {name: np.asarray(row, dtype=float) for name, row in over.items()}
+    for name, row in axes.items():
+        if len(row) == 1:
+            raise SceneError(f"over has one value of {name}: give at least its two ends")
+    return {name: np.linspace(row[0], row[1], count) if len(row) == 2 else row for name, row in axes.items()}

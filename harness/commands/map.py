@@ -1,0 +1,58 @@
+"""map: regions of what motions end in."""
+
+import os
+from functools import partial
+
+import click
+
+from ..arguments import WORKERS
+from ..errors import SceneError
+from .orbit import split_axis
+from .terminal import RuleType, SectionedCommand, Terminal, result_options
+
+
+@click.command("map", cls=SectionedCommand)
+@click.argument("source", metavar="MODEL|SCENE|FMU")
+@click.option(
+    "--over",
+    multiple=True,
+    required=True,
+    metavar="NAME=LO:HI[:N]",
+    help="Parameter that varies, with its ends and 21 or N values. Once or twice.",
+)
+@click.option(
+    *("--set", "values"),
+    multiple=True,
+    metavar="NAME=VALUE,...",
+    help="Parameters and start values; those of a scene are replaced. Repeatable.",
+)
+@click.option(
+    "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
+)
+@result_options
+def map_motions(source: str, over: tuple[str, ...], values: tuple[str, ...], workers: int, terminal: Terminal) -> None:
+    """Print what the motions of a model end in over one or two parameters, with exact edges between the regions.
+
+    Of one body that slides steadily, the regions say whether steady sliding is stable and whether stick-slip goes on;
+    of any other model, what the motion from its start ends in.  Of a model, its native FMU is run.
+
+    \b
+    Examples:
+      friction-fmus map belt --over v_belt=0.3:8 --over c=0.03:0.6
+      friction-fmus map forced --over Omega=2:15:40
+    """
+    from ..api import map_motions as compute_map
+    from ..results.provenance import describe_sources
+    from ..results.result import save_result
+    from ..scenes.assignments import parse_assignments
+    from ..simulation.resolve import resolve
+
+    axes = dict(map(split_axis, over))
+    if len(axes) < len(over):
+        raise SceneError("--over names a parameter twice")
+    settings = parse_assignments("--set", values)
+    with terminal.progress(1) as report:
+        compute = partial(compute_map, source, axes, settings, workers=workers, progress=partial(report, source))
+        folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])
+        result = save_result(folder, compute, "map", describe_sources(source))
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

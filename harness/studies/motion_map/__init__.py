@@ -1,0 +1,1 @@
+"""Maps of what the motions of an oscillator end in, over one or two parameters."""

@@ -1,0 +1,151 @@
+"""What motions end in at the points of a grid, and the edges between them along its lines, by bisection."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import HarnessError, SceneError
+from ...process.interrupt import check_interrupt
+from ...process.worker import WorkerPool
+from ...scenes.run_spec import RunSpec
+from ...simulation.native_equivalent import check_has_events, native_with_derivatives
+from ...simulation.oscillator import Oscillator
+from ...simulation.poincare import CYCLE, ReturnMap, turn_time
+from .result import Edge, MapResult
+
+PRECISION = 1e-12  # relative, of the values at edges
+STEADY, STICK_SLIP, BOTH, NEITHER = "steady sliding", "stick-slip", "steady sliding or stick-slip", "neither"
+
+Line = tuple[np.ndarray, list[str], list[Edge], int]  # points (n, axes), labels, edges, and the number of runs
+
+
+class LineSearch:
+    """Labels the points of a line of the grid, and finds the edges between them."""
+
+    def __init__(self, oscillator: Oscillator) -> None:
+        self.oscillator, self.map = oscillator, ReturnMap(oscillator)
+
+    def label(self, point: Sequence[float]) -> str:
+        """Return what motions end in.
+
+        Of one body that slides steadily, this is exact: by the eigenvalues of steady sliding, and by whether a motion
+        that has stuck sticks again. Of any other model it is what the motion from its start ends in.
+        """
+        self.oscillator.set_point(point)
+        found = self.oscillator.find_equilibrium()
+        if found is not None and len(found[1]) == 2:
+            is_stable = float(found[1].real.max()) < 0.0
+            sticks = self.map.sticks_again(found[0], turn_time(found[1]))
+            return {(1, 0): STEADY, (0, 1): STICK_SLIP, (1, 1): BOTH, (0, 0): NEITHER}[is_stable, sticks]
+        end = self.map.run_long(self.oscillator.start)
+        return f"{end.n_sticks} sticks in a period" if end.kind == CYCLE else end.kind
+
+    def search(self, points: np.ndarray) -> Line:
+        """Label the points (n, axes) of a line, of which one coordinate varies, and bisect between different ones."""
+        before, edges = self.oscillator.n_runs, list[Edge]()
+        labels = [self.label(point) for point in points.tolist()]
+        for (one, two), (a, b) in zip(pairwise(labels), pairwise(points), strict=True):
+            edges += self.bisect(a, b, one, two)
+        return points, labels, edges, self.oscillator.n_runs - before
+
+    def bisect(self, a: np.ndarray, b: np.ndarray, one: str, two: str) -> list[Edge]:
+        """Return the edges between two points; several if a third label is between theirs."""
+        if one == two:
+            return []
+        while np.abs(b - a).max() > PRECISION * np.abs(b).max():
+            check_interrupt()
+            middle = 0.5 * (a + b)
+            label = self.label(middle.tolist())
+            if label == one:
+                a = middle
+            elif label == two:
+                b = middle
+            else:
+                return self.bisect(a, middle, one, label) + self.bisect(middle, b, label, two)
+        return [Edge(tuple((0.5 * (a + b)).tolist()), one, two)]
+
+
+def search_line(spec: RunSpec, names: tuple[str, ...], points: np.ndarray) -> Line:
+    """Search a line in a worker process."""
+    with Oscillator(spec, names) as oscillator:
+        return LineSearch(oscillator).search(points)
+
+
+def grid_lines(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return the lines of a grid along each of its axes, with their points (n, axes)."""
+    if len(axes) == 1:
+        return [axes[0][:, None]]
+    x, y = axes
+    rows = [np.column_stack([x, np.full(len(x), value)]) for value in y]
+    columns = [np.column_stack([np.full(len(y), value), y]) for value in x]
+    return rows + columns
+
+
+def compute_map(
+    spec: RunSpec,
+    axes: dict[str, np.ndarray],
+    workers: int | None,
+    report: Callable[[float], None] = lambda share: None,
+) -> MapResult:
+    """Find what motions end in over one or two parameters.
+
+    Parameters
+    ----------
+    spec : RunSpec
+        FMU and values.
+    axes : dict of numpy.ndarray
+        Increasing values (n,) of each parameter.
+    workers : int or None
+        Number of worker processes; None for this process.
+    report : callable
+        Receives the progress from 0 to 1.
+
+    Raises
+    ------
+    SceneError
+        If a name or a value is not valid.
+    HarnessError
+        If the FMU is not suitable, or a worker dies.
+    """
+    names, run = tuple(axes), replace(spec, fmu=native_with_derivatives(spec.fmu))
+    for name in names:
+        if name in spec.values:
+            raise SceneError(f"{name} is both varied and set; remove one of them")
+    lines, grid, results = grid_lines([*axes.values()]), tuple(axes.values()), list[Line]()
+    with Oscillator(run, names) as oscillator:
+        check_has_events(run.fmu, oscillator.variables, oscillator.settings)
+        units = {name: oscillator.units[name] for name in names}
+        settings = {name: oscillator.default(name) for name in oscillator.parameters if name not in names}
+        if workers is None:
+            search = LineSearch(oscillator)
+            for line in lines:
+                results.append(search.search(line))
+                report(len(results) / len(lines))
+    if workers is not None:
+        results = search_in_workers(run, names, lines, workers, report)
+    labels = [label for _, found, _, _ in results[: len(grid[-1]) if len(grid) > 1 else 1] for label in found]
+    edges = tuple(edge for _, _, found, _ in results for edge in found)
+    return MapResult(spec, units, grid, tuple(labels), edges, sum(runs for *_, runs in results), settings)
+
+
+def search_in_workers(
+    spec: RunSpec, names: tuple[str, ...], lines: Sequence[np.ndarray], workers: int, report: Callable[[float], None]
+) -> list[Line]:
+    """Search lines in worker processes; return them in their order."""
+    spec = replace(spec, fmu=Path(os.path.abspath(spec.fmu)))
+    with WorkerPool(min(workers, len(lines))) as pool:
+        futures: list[Future[Line]] = [pool.submit(search_line, spec, names, line) for line in lines]
+        running = set(futures)
+        while running:
+            check_interrupt()
+            running -= pool.wait_for_any(running)
+            report(1.0 - len(running) / len(lines))
+        try:
+            return [future.result() for future in futures]
+        except pool.death_errors:
+            raise HarnessError(f"{spec.fmu.name}: a worker process died") from None

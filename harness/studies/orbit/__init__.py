@@ -1,0 +1,1 @@
+"""Periodic motions of oscillators with dry friction, their stability, and their branches over a parameter."""

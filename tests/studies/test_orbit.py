@@ -1,0 +1,206 @@
+"""Periodic motions of built FMUs, against closed forms, a transcendental equation and a solver of scipy."""
+
+from functools import cache
+from math import atan, pi, sqrt
+
+import commands
+import mpmath
+import numpy as np
+import pytest
+from build_cache import build_user_model
+from native_fmus import require_compiler
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import harness
+
+STEADY, STICK_SLIP, SLIDING = "steady sliding", "stick-slip", "orbit without sticking"
+
+
+@cache
+def native(name):
+    """Return the native FMU of a model."""
+    require_compiler()
+    (file,) = (commands.ROOT / "fmus").glob(f"**/{name}.py")
+    return build_user_model(file, "--native", "--platform", "linux64") / "native" / f"{name}.fmu"
+
+
+def motion(result, kind):
+    """Return the only motion of a kind."""
+    (found,) = [item for item in result.motions if item.kind == kind]
+    return found
+
+
+def edge_of_stick_slip(c, k=1.0, static=1.0, sliding=0.7):
+    """Return the belt speed at which a block with constant sliding friction just touches the belt again.
+
+    After it leaves the belt at v = v_belt and k x + c v = static, its next largest speed is v_belt.
+    """
+    with mpmath.workdps(30):
+        c, k, static, sliding = map(mpmath.mpf, (c, k, static, sliding))
+        w = mpmath.sqrt(k - c * c / 4)
+
+        def excess(speed):
+            x = (static - c * speed - sliding) / k
+            a, b = speed, -(k * x + c * speed / 2) / w  # v = exp(-c t/2) (a cos w t + b sin w t)
+            angle = mpmath.atan2(b * w - a * c / 2, a * w + b * c / 2)  # where the speed is extreme
+            angles = [angle + n * mpmath.pi for n in range(4) if angle + n * mpmath.pi > 0]
+            speeds = [mpmath.exp(-c * q / w / 2) * (a * mpmath.cos(q) + b * mpmath.sin(q)) for q in angles]
+            return next(v for v in speeds if v > 0) - speed
+
+        return float(mpmath.findroot(excess, (mpmath.mpf("0.05"), mpmath.mpf(3)), solver="anderson", tol=1e-25))
+
+
+@pytest.mark.parametrize("c", [0.05, 0.2])
+def test_stick_slip_ends_where_the_transcendental_equation_says(c):
+    exact = edge_of_stick_slip(c)
+    result = harness.orbit(
+        native("belt"), {"law": "coulomb", "c": c}, over={"v_belt": [0.7 * exact, 1.5 * exact, 2.0 * exact]}
+    )
+    (point,) = result.points
+    assert point.kind == "stick-slip ends (grazing)"
+    assert point.value == pytest.approx(exact, rel=1e-11)
+
+
+C, STATIC, DELTA = 0.1, 1.0, 3.0  # of the belt of Leine and others, with a damper
+
+
+def slide(x, speed):
+    """Return position, time and multiplier of the next turning point of a block that slides from the one at x.
+
+    The multiplier is that of Liouville: exp of the integral of the trace of the Jacobian.
+    """
+
+    def rates(t, y):
+        slip = speed - y[1]
+        force = STATIC / (1 + DELTA * slip)
+        return [y[1], -y[0] - C * y[1] + force, -C + STATIC * DELTA / (1 + DELTA * slip) ** 2]
+
+    t, y = 0.0, np.array([x, 0.0, 0.0])
+    for direction in (1, -1):
+
+        def turns(t, y):
+            return y[1]
+
+        turns.direction, turns.terminal = direction, True
+        part = solve_ivp(rates, (0, 30), y, method="DOP853", rtol=1e-13, atol=1e-15, events=turns)
+        t, y = t + part.t[-1], part.y[:, -1]
+    return y[0], t, np.exp(y[2])
+
+
+@pytest.mark.parametrize("speed", [1.7, pytest.param(2.4, marks=pytest.mark.slow)])
+def test_the_unstable_orbit_of_the_belt_is_that_of_scipy(speed):
+    orbit = motion(harness.orbit(native("belt"), {"c": C, "v_belt": speed}), SLIDING)
+    x = brentq(lambda x: slide(x, speed)[0] - x, orbit.largest - 0.1, orbit.largest + 0.1, xtol=1e-13)
+    _, period, multiplier = slide(x, speed)
+    assert orbit.stability == "unstable"
+    assert orbit.largest == pytest.approx(x, abs=1e-10)
+    assert orbit.period == pytest.approx(period, rel=1e-11)
+    np.testing.assert_allclose(orbit.multipliers, [multiplier], rtol=1e-9)
+
+
+def test_the_belt_changes_where_it_should_as_the_speed_grows():
+    """Steady sliding turns stable where the falling friction equals the damping; stick-slip ends later."""
+    result = harness.orbit(native("belt"), {"c": C}, over={"v_belt": np.linspace(0.6, 3.1, 6)})
+    stable, ends = result.points
+    assert (stable.kind, ends.kind) == ("steady sliding turns stable", "stick-slip ends (grazing)")
+    assert stable.value == pytest.approx((sqrt(DELTA * STATIC / C) - 1) / DELTA, rel=1e-12)
+    assert ends.value == pytest.approx(2.892345819178, abs=1e-11)  # by bisection on runs of an earlier program
+    kinds = {item.kind for item in result.motions if stable.value < item.value < ends.value}
+    assert kinds == {STEADY, SLIDING, STICK_SLIP}
+    assert {item.kind for item in result.motions if item.value > ends.value} == {STEADY}
+
+
+def test_a_sled_without_damping_has_the_closed_form_of_stick_slip():
+    m, k, mu_s, mu_d, g, speed = 12.5, 742.5, 0.9, 0.6, 9.81, 0.034
+    orbit = motion(harness.orbit(native("stickslip")), STICK_SLIP)
+    fall, frequency = (mu_s - mu_d) * m * g / k, sqrt(k / m)
+    stick = 2 * fall / speed
+    slip = 2 / frequency * (pi - atan(fall * frequency / speed))
+    assert orbit.period == pytest.approx(stick + slip, rel=1e-11)
+    assert orbit.stick_time == pytest.approx(stick, rel=1e-11)
+    assert orbit.amplitude == pytest.approx(sqrt(fall**2 + (speed / frequency) ** 2), rel=1e-10)
+    assert np.abs(orbit.multipliers).max() < 1e-9
+
+
+def hartog(frequency, m=1.0, k=100.0, force=10.0, friction=6.0):
+    """Return the amplitude without stops of Den Hartog's oscillator."""
+    r = frequency / sqrt(k / m)
+    u = np.sin(pi / r) / (r * (1 + np.cos(pi / r)))
+    return force / k * sqrt(1 / (1 - r * r) ** 2 - (friction / force * u) ** 2)
+
+
+def test_a_forced_oscillator_without_stops_has_the_amplitude_of_den_hartog():
+    result = harness.orbit(native("forced"), over={"Omega": [5.0, 7.0, 9.0, 13.0]})
+    stops, *others = result.motions
+    assert (stops.kind, stops.n_sticks) == (STICK_SLIP, 2)
+    for orbit in others:
+        assert (orbit.kind, orbit.stability) == (SLIDING, "stable")
+        assert orbit.amplitude == pytest.approx(hartog(orbit.value), rel=1e-10)
+        assert orbit.period == pytest.approx(2 * pi / orbit.value, rel=1e-14)
+    (point,) = result.points
+    assert point.kind == "2 sticks in a period become 0 sticks in a period"
+    assert 5.0 < point.value < 7.0
+
+
+def test_a_motion_that_does_not_repeat_is_named_and_not_drawn():
+    """A force on a spring without friction: two frequencies that never meet."""
+    result = harness.orbit(native("forced"), {"f": 0.0, "Omega": 3.1})
+    assert not result.motions
+    assert "has not repeated" in result.remarks[0]
+    with pytest.raises(harness.HarnessError, match="nothing to plot"):
+        result.plot()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"over": {"v_belt": [1.0]}}, "one value"),
+        ({"over": {"v_belt": [1.0, 2.0], "c": [0.0, 1.0]}}, "give one"),
+        ({"over": {"speed": [1.0, 2.0]}}, "unknown parameter 'speed'"),
+        ({"values": {"v_belt": 1.0}, "over": {"v_belt": [1.0, 2.0]}}, "both varied and set"),
+    ],
+)
+def test_arguments_are_refused_in_one_sentence(arguments, message):
+    with pytest.raises(harness.SceneError, match=message):
+        harness.orbit(native("belt"), **arguments)
+
+
+def test_the_command_saves_what_the_function_returns(tmp_path):
+    result = commands.harness(tmp_path, "orbit", native("belt"), "--set", "c=0.1", "--over", "v_belt=1:2:3", "--json")
+    loaded = harness.load_result(tmp_path / "results" / "orbit" / "belt-v_belt")
+    assert f'"value": {loaded.points[0].value!r}' in result.stdout
+    refused = commands.harness(tmp_path, "orbit", native("belt"), "--over", "v_belt=2:1")
+    assert refused.returncode == 2
+    assert "write it as in v_belt=0.1:3:60" in refused.stderr
+
+
+def test_the_map_of_the_belt_has_the_edges_of_closed_forms():
+    """Also in worker processes; constant friction leaves steady sliding stable, and both motions possible."""
+    over = {"c": [0.05, 0.1, 0.2], "v_belt": [0.1, 0.12, 1.5]}
+    result = harness.map_motions(native("belt"), over, {"law": "coulomb"})
+    both, steady = "steady sliding or stick-slip", "steady sliding"
+    assert result.labels == (both,) * 6 + (steady,) * 3
+    assert {(edge.below, edge.above) for edge in result.edges} == {(both, steady)}
+    for edge, c in zip(result.edges, over["c"], strict=True):
+        assert edge.point == pytest.approx((c, edge_of_stick_slip(c)), rel=1e-11)
+    shared = harness.map_motions(native("belt"), over, {"law": "coulomb"}, workers=2)
+    assert shared.edges == result.edges
+
+
+def test_the_map_of_a_forced_mass_counts_its_stops():
+    result = harness.map_motions(native("forced"), {"Omega": [5.0, 6.0, 7.0]})
+    assert result.labels == (*["2 sticks in a period"] * 2, "0 sticks in a period")
+    value = result.edges[-1].point[0]
+    assert value == pytest.approx(
+        harness.orbit(native("forced"), over={"Omega": [6.0, 6.5, 7.0]}).points[0].value, rel=1e-9
+    )
+
+
+def test_the_command_map_saves_what_the_function_returns(tmp_path):
+    arguments = ("--over", "v_belt=0.4:6:3", "--over", "c=0.1:0.2:2", "--workers", "1", "--json")
+    result = commands.harness(tmp_path, "map", native("belt"), *arguments)
+    loaded = harness.load_result(tmp_path / "results" / "map" / "belt-v_belt-c")
+    stable = [edge.point for edge in loaded.edges if edge.below == "stick-slip"]
+    assert stable[0][0] == pytest.approx((sqrt(DELTA * STATIC / C) - 1) / DELTA, rel=1e-11)
+    assert result.returncode == 0
