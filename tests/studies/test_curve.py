@@ -68,7 +68,7 @@ def test_a_result_goes_on_to_models_and_tables(tmp_path):
         np.testing.assert_allclose(force, friction(speed, FORWARD), atol=0.1)
 
 
-@pytest.mark.parametrize("backward", slow_after(1, [BACKWARD, FORWARD]))
+@pytest.mark.parametrize("backward", slow_after(1, [(BACKWARD,), (FORWARD,)]))
 def test_the_fmu_of_the_table_has_the_friction_of_the_points(tmp_path, backward):
     """It sticks and slips in both directions, and slides with the friction of the points, less their mean bias."""
     write_points(tmp_path / "bench.csv", "v [m/s],F [N]", backward)
