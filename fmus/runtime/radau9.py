@@ -10,9 +10,8 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.5 and IV.8;
 differential equations solved by Radau methods, J. Comp. Appl. Math. 111 (1999) 93-111 (iteration, error estimate).
 """
 
-from math import inf, nan
+from math import nan
 
-from .rate_rounding import rounding_sizes
 from .vectors import (
     ContactVector,
     RateVector,
@@ -42,7 +41,6 @@ POWER, SAFETY, SHRINK, GROW = 1.0 / 6.0, 0.9, 0.12, 4.0
 MAX_ITERATIONS = 7
 NEWTON_TOLERANCE = 0.1  # error of the iteration, in multiples of the tolerance
 CAUTIOUS_STEPS, CAUTIOUS_GROWTH = 2, 1.5  # after a divergence of the iteration
-CHANGE_ROUNDING = 100.0  # of a change in the iteration, to which 25 rates contribute, over that of a rate
 HOPELESS, LARGE = 10.0, 1e100  # excess over it, predicted for the last iteration; change that ends the iteration
 
 # fmt: off
@@ -197,7 +195,6 @@ class Radau9:
         scale = error_size(y)
         scale = elementwise_max(control.error_scale_floor, scale)
         tolerance = NEWTON_TOLERANCE * step.tolerance
-        u1 = dynamic_part(magnitude(z5))  # the last change; of none yet, what the last step predicts
         has_converged, last_change, quotient, share, iterations = False, 1.0, 1.0, 1.0, 0
         for turn in range(MAX_ITERATIONS):
             y1 = y + stage_change(h, f, C1, A11, A12, A13, A14, A15, z1, z2, z3, z4, z5, z1)
@@ -238,10 +235,9 @@ class Radau9:
             u3 = dynamic_part(magnitude(u3))
             u4 = dynamic_part(magnitude(u4))
             u5 = dynamic_part(magnitude(u5))
-            u1 = u1 + u2 + u3 + u4 + u5
-            u2 = dynamic_part(u1 / scale)
-            change = max_of(u2) / tolerance
-            if not change < (LARGE if turn > 0 else inf):  # also for NaN; the first change contains that of the rates
+            u1 = dynamic_part((u1 + u2 + u3 + u4 + u5) / scale)
+            change = max_of(u1) / tolerance
+            if not change < LARGE:  # also for NaN
                 break
             if turn > 0:
                 quotient = change / last_change
@@ -257,12 +253,6 @@ class Radau9:
                 break
             last_change = change
         control.stages = STAGES * iterations
-        if not has_converged and control.floor_share > 0.0:
-            # the rates may be rounding errors, as while all contacts stick: no iteration makes the change smaller
-            least = rounding_sizes(model, step, t + h, y, modes, h)
-            scale = elementwise_max(scale, least)
-            u1 = dynamic_part(u1 / scale)
-            has_converged = max_of(u1) <= CHANGE_ROUNDING * step.tolerance
         if not has_converged:
             self.n_cautious = CAUTIOUS_STEPS
             e = nan * y
@@ -284,12 +274,6 @@ class Radau9:
         d = magnitude(e)
         d = d / size
         error = h * max_of(d) / step.tolerance
-        if error > 1.0 and control.floor_share > 0.0:
-            least = rounding_sizes(model, step, t + h, y, modes, h)
-            size = elementwise_max(size, least)
-            d = magnitude(e)
-            d = d / size
-            error = h * max_of(d) / step.tolerance
         if error > 1.0 and (is_repeated or self.h_last == 0.0):  # a filtered estimate is less pessimistic
             y8 = y + h * e
             f8 = model.rates(t, y8, modes)
