@@ -115,6 +115,14 @@ class Oscillator:
         self.exchange: FmuInstance | None = None
         self.equilibria: list[np.ndarray] = []
         self.settings = {variable.name: value for variable, value in resolve_settings(self.spec, variables)}
+        try:
+            self.find_coordinates_of_start(varied, len(initial))
+        except BaseException:
+            self.resources.close()  # an open instance keeps standard error redirected
+            raise
+
+    def find_coordinates_of_start(self, varied: Sequence[str], n_states: int) -> None:
+        """Find how parameters move the start, from the first `n_states` of them that set states, and the coordinates."""
         self.set_point([self.default(name) for name in varied])
         self.offsets = np.array([self.default(name) for name in self.initial])
         self.turned = np.zeros((len(self.states), len(self.initial)))
@@ -123,7 +131,7 @@ class Oscillator:
         columns = [self.begin_with(self.offsets + step).y - self.start for step in steps]
         self.matrix = np.array(columns).reshape(-1, len(self.states)).T
         self.inverse = np.linalg.pinv(self.matrix)
-        self.find_phase_angle(range(len(initial), len(self.initial)))
+        self.find_phase_angle(range(n_states, len(self.initial)))
         self.inverse = np.linalg.pinv(self.matrix)
         self.find_coordinates()
 

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 import harness
 
-STEADY, STICK_SLIP, SLIDING = "steady sliding", "stick-slip", "orbit without sticking"
+STEADY, STICK_SLIP, SLIDING = "steady sliding", "stick-slip", "sliding orbit"
 
 
 @cache

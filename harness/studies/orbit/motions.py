@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-AT_REST, STEADY, STICK_SLIP, SLIDING_ORBIT = "rest", "steady sliding", "stick-slip", "orbit without sticking"
+AT_REST, STEADY, STICK_SLIP, SLIDING_ORBIT = "rest", "steady sliding", "stick-slip", "sliding orbit"
 NEUTRAL = 1e-9  # growth in a period, relative, below which a motion is neither stable nor unstable
 
 
@@ -19,7 +19,7 @@ class Motion:
     value : float
         Value of the parameter; NaN without one.
     kind : str
-        "rest", "steady sliding", "stick-slip" or "orbit without sticking".
+        "rest", "steady sliding", "stick-slip" or "sliding orbit".
     largest, smallest : float
         Extreme values of the coordinate.
     period : float

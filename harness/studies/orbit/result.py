@@ -89,7 +89,7 @@ class OrbitResult(Result):
             ResultColumn(f"amplitude [{self.coordinate_unit}]", "{0[amplitude]:.6g}"),
             ResultColumn("stick [s]", "{0[stick_time]:.6g}"),
             ResultColumn("sticks", "{0[sticks]}"),
-            ResultColumn("multiplier", "{0[multiplier]:.6g}"),
+            ResultColumn("multiplier", "{0[multiplier]:.4g}"),
         )
 
     def _point_columns(self) -> tuple[ResultColumn, ...]:
