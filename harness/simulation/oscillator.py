@@ -122,7 +122,7 @@ class Oscillator:
             raise
 
     def find_coordinates_of_start(self, varied: Sequence[str], n_states: int) -> None:
-        """Find how parameters move the start, from the first `n_states` of them that set states, and the coordinates."""
+        """Find how parameters, of which the first `n_states` set states, move the start, and the coordinates."""
         self.set_point([self.default(name) for name in varied])
         self.offsets = np.array([self.default(name) for name in self.initial])
         self.turned = np.zeros((len(self.states), len(self.initial)))
