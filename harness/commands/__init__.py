@@ -74,7 +74,7 @@ def run_published_scenes(terminal: Terminal) -> None:
     from ..scenes.scene import load_scene, shipped_scenes
     from ..studies.run.result import conclude, explain_chatter, tabulate_quantities
 
-    scenes = [scene for scene in (load_scene(name) for name in shipped_scenes()) if scene.known]
+    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.known]
     for scene in scenes:
         check_built(scene.run.fmu)
     runs, rows, failed = [], [], list[str]()

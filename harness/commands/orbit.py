@@ -5,17 +5,12 @@ from functools import partial
 import click
 
 from ..errors import MAX_VALUE_LENGTH, SceneError
-from .terminal import SectionedCommand, Terminal, result_options
+from .terminal import SET_OPTION, SectionedCommand, Terminal, result_options
 
 
 @click.command(cls=SectionedCommand)
 @click.argument("source", metavar="MODEL|SCENE|FMU")
-@click.option(
-    *("--set", "values"),
-    multiple=True,
-    metavar="NAME=VALUE,...",
-    help="Parameters and start values; those of a scene are replaced. Repeatable.",
-)
+@SET_OPTION
 @click.option("--over", metavar="NAME=LO:HI[:N]", help="Parameter that varies, with its ends and 61 or N values.")
 @result_options
 def orbit(source: str, values: tuple[str, ...], over: str | None, terminal: Terminal) -> None:

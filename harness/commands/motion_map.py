@@ -8,7 +8,7 @@ import click
 from ..arguments import WORKERS
 from ..errors import SceneError
 from .orbit import split_axis
-from .terminal import RuleType, SectionedCommand, Terminal, result_options
+from .terminal import SET_OPTION, RuleType, SectionedCommand, Terminal, result_options
 
 
 @click.command("map", cls=SectionedCommand)
@@ -20,12 +20,7 @@ from .terminal import RuleType, SectionedCommand, Terminal, result_options
     metavar="NAME=LO:HI[:N]",
     help="Parameter that varies, with its ends and 21 or N values. Once or twice.",
 )
-@click.option(
-    *("--set", "values"),
-    multiple=True,
-    metavar="NAME=VALUE,...",
-    help="Parameters and start values; those of a scene are replaced. Repeatable.",
-)
+@SET_OPTION
 @click.option(
     "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
 )
