@@ -328,6 +328,19 @@ class ReturnMap:
                 orbits.append(self.shoot(y + amplitude * self.oscillator.gauge, time))
         return orbits
 
+    def sticks_in_turn(self, y: np.ndarray, duration: float) -> bool:
+        """Return whether a motion from states y sticks before its second maximum, by each internal step of the FMU.
+
+        It may also pass to sliding in the other direction.
+        """
+        last, maxima = None, 0
+        for point in self.oscillator.follow(y, MAX_TURNS * duration):
+            maxima += last is not None and self.is_maximum(last, point)
+            if point.sticks or maxima > 1:
+                return point.sticks
+            last = point
+        return False
+
     def sticks_again(self, y: np.ndarray, duration: float) -> bool:
         """Return whether a motion around steady sliding y that has stuck sticks again, before its second maximum.
 
@@ -344,7 +357,7 @@ class ReturnMap:
                 if not n_changes and point.n_changes and point.modes == first.modes:
                     n_changes, maxima = point.n_changes, int(self.is_maximum(last, point))
                 if n_changes and point.n_changes > n_changes:
-                    return True
+                    return point.sticks or self.sticks_in_turn(last.y, duration)
                 if n_changes and maxima > 1:
                     return False
                 if not n_changes and maxima > 2:

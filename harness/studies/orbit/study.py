@@ -54,7 +54,8 @@ class BranchTracer:
             motions.append(self.describe_equilibrium(value, *equilibrium))
             if len(equilibrium[1]) == 2:  # a motion that sticks forgets its start
                 sticks = self.map.sticks_again(equilibrium[0], turn_time(equilibrium[1]))
-                seeds = [equilibrium[0] + self.map.size * self.oscillator.gauge] if sticks else []
+                if sticks or motions[0].growth < 0.0:
+                    seeds = [equilibrium[0] + self.map.size * self.oscillator.gauge] if sticks else []
                 try:
                     orbits += self.map.sliding_orbits(*equilibrium)
                 except NoOrbitError as error:
@@ -170,7 +171,7 @@ class BranchTracer:
         edge = last if sticks_below else first
         motions = [motion for motion in self.find_motions(edge, []) if motion.kind == STICK_SLIP]
         x = motions[0].largest if motions else nan
-        kind = "stick-slip ends (grazing)" if sticks_below else "stick-slip begins (grazing)"
+        kind = "stick-slip ends" if sticks_below else "stick-slip begins"
         return SpecialPoint(edge, kind, x, "bisection on whether it sticks again")
 
     def locate_fold(self, low: float, high: float, sliding: list[list[Motion]]) -> SpecialPoint:
