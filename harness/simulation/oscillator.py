@@ -14,17 +14,18 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from ..errors import HarnessError, check_names
+from ..errors import HarnessError, SceneError, check_names
 from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import read_description, unpack_once
 from .fmu_instance import CALL_FAILURES, FmuInstance
 from .fmu_variables import METHOD
 from .model_data import read_model_data
+from .native_equivalent import check_has_events
 from .runner import open_instance, open_session
 from .session import Session, resolve_settings
 from .variable_values import enumeration_labels, variable_unit
-from .variational import VariationalRun, has_derivatives, state_variables
+from .variational import VariationalRun, state_variables
 
 RTOL = "solver.rtol"
 DEFAULTS = {METHOD: "dop853", RTOL: 1e-12}  # of the solver, unless a user sets others
@@ -55,7 +56,7 @@ class Oscillator:
     Parameters
     ----------
     spec : RunSpec
-        FMU and values.
+        Native FMU with directional derivatives, and values.
     varied : sequence of str
         Parameters that `set_point` changes.
 
@@ -76,20 +77,20 @@ class Oscillator:
 
     Raises
     ------
+    SceneError
+        If a varied parameter is unknown or set.
     HarnessError
-        If the FMU has no directional derivatives, or its states cannot be set.
+        If its friction law has no events, or its states cannot be set.
     """
 
     def __init__(self, spec: RunSpec, varied: Sequence[str] = ()) -> None:
         description, self.folder = read_description(spec.fmu), unpack_once(spec.fmu)
-        if not has_derivatives(self.folder):
-            raise HarnessError(
-                f"{spec.fmu.name} has no directional derivatives; native FMUs of this project have them: build one "
-                "with `friction-fmus build --native`"
-            )
         variables = {variable.name: variable for variable in description.modelVariables}
         settable = [name for name, item in variables.items() if item.causality == "parameter" and item.type == "Real"]
         check_names("parameter", varied, settable)
+        for name in varied:
+            if name in spec.values:
+                raise SceneError(f"{name} is both varied and set; remove one of them")
         self.variables, self.varied, self.n_runs = variables, tuple(varied), 0
         self.parameters = settable
         self.states = tuple(state.name for state in state_variables(description))
@@ -107,23 +108,21 @@ class Oscillator:
         initial = find_start_parameters(description, self.states)
         angles = [name for name in settable if variables[name].variability == "fixed" and self.units[name] == "rad"]
         self.initial = tuple(dict.fromkeys([*initial, *angles]))
-        self.resources = ExitStack()
-        opened = open_session(self.spec, (*self.varied, *self.initial), [*reals, *modes, "events.count"])
-        session = self.resources.enter_context(opened)
-        assert isinstance(session, Session)
-        self.session, self.instance = session, session.instance
         self.exchange: FmuInstance | None = None
         self.equilibria: list[np.ndarray] = []
         self.settings = {variable.name: value for variable, value in resolve_settings(self.spec, variables)}
-        try:
-            self.find_coordinates_of_start(varied, len(initial))
-        except BaseException:
-            self.resources.close()  # an open instance keeps standard error redirected
-            raise
+        check_has_events(spec.fmu, variables, self.settings)
+        with ExitStack() as resources:  # an open instance keeps standard error redirected
+            opened = open_session(self.spec, (*self.varied, *self.initial), [*reals, *modes, "events.count"])
+            session = resources.enter_context(opened)
+            assert isinstance(session, Session)
+            self.session, self.instance = session, session.instance
+            self.find_coordinates_of_start(len(initial))
+            self.resources = resources.pop_all()
 
-    def find_coordinates_of_start(self, varied: Sequence[str], n_states: int) -> None:
+    def find_coordinates_of_start(self, n_states: int) -> None:
         """Find how parameters, of which the first `n_states` set states, move the start, and the coordinates."""
-        self.set_point([self.default(name) for name in varied])
+        self.set_point([self.default(name) for name in self.varied])
         self.offsets = np.array([self.default(name) for name in self.initial])
         self.turned = np.zeros((len(self.states), len(self.initial)))
         self.start = self.begin_with(self.offsets).y
@@ -290,7 +289,10 @@ class Oscillator:
         self.inverse = np.linalg.pinv(reduced) @ set_by.T  # translations stay as they are at the start
         for name, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
             if np.abs(missing).max() > 1e-9:
-                raise HarnessError(f"{self.spec.fmu.name}: no parameter sets {name} at the start: declare one")
+                raise HarnessError(
+                    f"{self.spec.fmu.name}: no parameter sets {name} at the start: declare one, as in start={name}0 of "
+                    f"the state, with {name}0 a Fixed of the model"
+                )
 
     @property
     def forced_period(self) -> float | None:

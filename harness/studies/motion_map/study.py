@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError
+from ...errors import HarnessError
 from ...process.interrupt import check_interrupt
 from ...process.worker import WorkerPool
 from ...scenes.run_spec import RunSpec
-from ...simulation.native_equivalent import check_has_events, native_with_derivatives
+from ...simulation.native_equivalent import native_with_derivatives
 from ...simulation.oscillator import Oscillator
 from ...simulation.poincare import CYCLE, ReturnMap, turn_time
 from .result import Edge, MapResult
@@ -113,12 +113,8 @@ def compute_map(
         If the FMU is not suitable, or a worker dies.
     """
     names, run = tuple(axes), replace(spec, fmu=native_with_derivatives(spec.fmu))
-    for name in names:
-        if name in spec.values:
-            raise SceneError(f"{name} is both varied and set; remove one of them")
     lines, grid, results = grid_lines([*axes.values()]), tuple(axes.values()), list[Line]()
     with Oscillator(run, names) as oscillator:
-        check_has_events(run.fmu, oscillator.variables, oscillator.settings)
         units = {name: oscillator.units[name] for name in names}
         settings = {name: oscillator.default(name) for name in oscillator.parameters if name not in names}
         if workers is None:

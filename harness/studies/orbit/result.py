@@ -85,7 +85,7 @@ class OrbitResult(Result):
             *[value] * bool(self.parameter),
             ResultColumn("motion", "{0[motion]}", is_text=True),
             ResultColumn("stability", "{0[stability]}", is_text=True),
-            ResultColumn("period [s]", "{0[period]:.9g}"),
+            ResultColumn("period [s]", "{0[period]:.8g}"),
             ResultColumn(f"amplitude [{self.coordinate_unit}]", "{0[amplitude]:.6g}"),
             ResultColumn("stick [s]", "{0[stick_time]:.6g}"),
             ResultColumn("sticks", "{0[sticks]}"),

@@ -7,9 +7,8 @@ from math import nan, pi
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from ...errors import SceneError
 from ...scenes.run_spec import RunSpec
-from ...simulation.native_equivalent import check_has_events, native_with_derivatives
+from ...simulation.native_equivalent import native_with_derivatives
 from ...simulation.oscillator import Oscillator
 from ...simulation.poincare import (
     CYCLE,
@@ -280,11 +279,8 @@ def compute_orbits(
     HarnessError
         If the FMU is not suitable.
     """
-    if parameter in spec.values:
-        raise SceneError(f"{parameter} is both varied and set; remove one of them")
     run = replace(spec, fmu=native_with_derivatives(spec.fmu))
     with Oscillator(run, (parameter,) if parameter else ()) as oscillator:
-        check_has_events(run.fmu, oscillator.variables, oscillator.settings)
         tracer, motions, points = BranchTracer(oscillator), list[list[Motion]](), list[SpecialPoint]()
         for number, value in enumerate(values or (nan,)):
             seeds = [motion.y for motion in (motions[-1] if motions else ()) if motion.kind != STEADY]
