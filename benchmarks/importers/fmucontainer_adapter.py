@@ -37,7 +37,7 @@ def run_request(request: ImporterRequest) -> ImporterReply:
         "fmu": files,
         "step_size": request.step,
         "input": [[name, files[0], name] for name in inputs],
-        "output": [[file, name, f"{name}_{i}"] for i, file in enumerate(files) for name in request.run.outputs],
+        "output": [[file, name, f"{name}_of_{i}"] for i, file in enumerate(files) for name in request.run.outputs],
         "link": [[files[0], request.connection[0], files[1], request.connection[1]]] if request.connection else [],
     }
     fmu = build_container(path, files, json.dumps(container))

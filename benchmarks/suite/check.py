@@ -4,6 +4,8 @@ RESULTS has a file CASE_out.csv for each case: the column `time` in s, and the c
 Other rows and columns are ignored; of rows with one time, the last counts. The row of the start may be missing.
 
 motion   the largest error of a state, relative to its largest value, is within the tolerance of the case
+outputs  that of each other output that RESULTS has is within ten times the tolerance, since some outputs magnify the
+         errors of states, but for a millionth of the run around an event or a jump of the input
 events   `mode` is that of the certified events at each time, but for a millionth of the run around an event
 rest     while the certified body is at rest, its states do not change
 
@@ -14,10 +16,12 @@ import csv
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 EVENT_TOLERANCE = 1e-6  # of the run, around an event
+OUTPUT_FACTOR = 10.0  # by which errors of outputs other than states may exceed the tolerance
 REST_TOLERANCE = 1e-12  # of the largest value of a state
 
 
@@ -39,40 +43,63 @@ def find_rows(time: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.asarray(rows)
 
 
-def check_case(folder: Path, results: Path, name: str, tolerance: float) -> tuple[str, str, str]:
-    """Return the verdicts on motion, events and rest; a verdict that begins with a minus sign is a failure."""
+def read_times(file: Path) -> np.ndarray:
+    """Return the column `time` (n,) of a CSV file in s; empty without the file or without rows."""
+    if not file.is_file():
+        return np.empty(0)
+    with file.open(newline="", encoding="utf-8") as lines:
+        return np.array([float(row["time"]) for row in csv.DictReader(lines)])
+
+
+def is_apart(points: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return whether each point (n,) in s is apart from all times."""
+    distance = np.abs(points[:, None] - times[None, :]).min(axis=1, initial=np.inf)
+    return np.asarray(distance > EVENT_TOLERANCE * (points[-1] - points[0]))
+
+
+def check_case(folder: Path, results: Path, name: str, case: dict[str, Any]) -> dict[str, str]:
+    """Return the verdicts by their names; one that begins with a minus sign is a failure."""
     file = results / f"{name}_out.csv"
     if not file.is_file():
-        return ("- no result", "", "")
+        return {"motion": "- no result"}
     reference, result = read_columns(folder / name / f"{name}_ref.csv"), read_columns(file)
-    states = [column for column in reference if column not in ("time", "mode")]
+    states, tolerance = case["states"], case["tolerance"]
     if lacking := [column for column in ("time", *states) if column not in result]:
-        return (f"- {', '.join(lacking)} missing", "", "")
+        return {"motion": f"- {', '.join(lacking)} missing"}
     if result["time"].min() > reference["time"][0] + 1e-6 * (reference["time"][1] - reference["time"][0]):
         reference = {column: values[1:] for column, values in reference.items()}  # some tools record no start
     time = reference["time"]
     try:
         rows = find_rows(result["time"], time)
     except ValueError as error:
-        return (f"- {error}", "", "")
-    sizes = {column: np.abs(reference[column]).max() or 1.0 for column in states}
-    largest = max(np.max(np.abs(result[column][rows] - reference[column])) / sizes[column] for column in states)
-    motion = f"{'' if largest <= tolerance else '- '}{largest:.0e}"
+        return {"motion": f"- {error}"}
+    sizes = {column: np.abs(values).max() or 1.0 for column, values in reference.items()}
+    errors = {
+        column: np.abs(result[column][rows] - reference[column]) / sizes[column]
+        for column in reference
+        if column in result
+    }
+    largest = max(errors[column].max() for column in states)
+    verdicts = {"motion": f"{'' if largest <= tolerance else '- '}{largest:.0e}"}
+    events, inputs = (read_times(folder / name / f"{name}_{kind}.csv") for kind in ("events", "in"))
+    is_between = is_apart(time, events)
+    is_continuous = is_between & is_apart(time, inputs)
+    others = [column for column in errors if column not in ("time", "mode", *states)]
+    wrong = [column for column in others if not errors[column][is_continuous].max() <= OUTPUT_FACTOR * tolerance]
+    verdicts["outputs"] = f"- {', '.join(wrong)}" if wrong else f"{len(others)}"
     if "mode" not in reference:
-        return (motion, "", "")
+        return verdicts
     if "mode" not in result:
-        return (motion, "- mode missing", "")
-    with (folder / name / f"{name}_events.csv").open(newline="", encoding="utf-8") as lines:
-        events = np.array([float(row["time"]) for row in csv.DictReader(lines)])
-    distance = np.abs(time[:, None] - events[None, :]).min(axis=1) if len(events) else np.full(len(time), np.inf)
-    is_wrong = (result["mode"][rows] != reference["mode"]) & (distance > EVENT_TOLERANCE * (time[-1] - time[0]))
+        return verdicts | {"events": "- mode missing"}
+    is_wrong = (result["mode"][rows] != reference["mode"]) & is_between
     first = time[is_wrong][0] if is_wrong.any() else 0.0
-    verdict = f"- {is_wrong.sum()} modes, from {first:.6g} s" if is_wrong.any() else f"{len(events)}"
+    verdicts["events"] = f"- {is_wrong.sum()} modes, from {first:.6g} s" if is_wrong.any() else f"{len(events)}"
     at_rest = np.all([reference[column][1:] == reference[column][:-1] for column in states], axis=0)
     changes = [np.abs(np.diff(result[column][rows]))[at_rest] / sizes[column] for column in states]
     creep = max((change.max() for change in changes if change.size), default=0.0)
-    rest = "" if not at_rest.any() else f"- moves by {creep:.0e}" if not creep <= REST_TOLERANCE else "at rest"
-    return (motion, verdict, rest)
+    if at_rest.any():
+        verdicts["rest"] = "at rest" if creep <= REST_TOLERANCE else f"- moves by {creep:.0e}"
+    return verdicts
 
 
 def main(arguments: list[str]) -> int:
@@ -84,13 +111,14 @@ def main(arguments: list[str]) -> int:
         print(f"Usage: python check.py RESULTS [CASE...]; cases: {', '.join(cases)}", file=sys.stderr)
         return 2
     failed = 0
-    print(f"{'case':14} {'verdict':7} {'motion':10} {'events':28} rest")
+    print(f"{'case':14} {'verdict':7} {'motion':10} {'outputs':10} {'events':28} rest")
     for name in names or cases:
-        verdicts = check_case(folder, Path(results), name, cases[name]["tolerance"])
-        has_failed = any(verdict.startswith("-") for verdict in verdicts)
+        verdicts = check_case(folder, Path(results), name, cases[name])
+        has_failed = any(verdict.startswith("-") for verdict in verdicts.values())
         failed += has_failed
-        motion, events, rest = verdicts
-        print(f"{name:14} {'FAILED' if has_failed else 'passed':7} {motion:10} {events:28} {rest}".rstrip())
+        motion, outputs, events, rest = (verdicts.get(key, "") for key in ("motion", "outputs", "events", "rest"))
+        verdict = "FAILED" if has_failed else "passed"
+        print(f"{name:14} {verdict:7} {motion:10} {outputs:10} {events:28} {rest}".rstrip())
     print(f"{failed} of {len(names or cases)} cases failed")
     return int(failed > 0)
 

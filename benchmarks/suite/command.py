@@ -53,8 +53,7 @@ def suite(
 
     verdicts = {
         importer: {
-            name: run_case(run, folder / name, folder / "results" / importer, case["tolerance"])
-            for name, case in index.items()
+            name: run_case(run, folder / name, folder / "results" / importer, case) for name, case in index.items()
         }
         for importer, run in available_runners().items()
     }

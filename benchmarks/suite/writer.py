@@ -4,7 +4,7 @@ CASE/fmi2/MODEL.fmu, CASE/fmi3/MODEL.fmu    native FMUs, co-simulation and model
 CASE/CASE_ref.opt       start, stop, communication step and tolerance, as in the FMI cross-check
 CASE/CASE_start.csv     start values other than those of the FMU: name, value
 CASE/CASE_in.csv        input, with two rows at a jump; only of some cases
-CASE/CASE_ref.csv       certified states and mode, after the events of each time
+CASE/CASE_ref.csv       certified states and mode, and the other outputs, after the events of each time
 CASE/CASE_events.csv    certified events: time, contact, mode before and after
 CASE/README.md          what the case catches
 """
@@ -17,12 +17,17 @@ from pathlib import Path
 
 import numpy as np
 
+from harness import simulate
 from harness.errors import HarnessError
 from harness.process.subprocess_runner import run_module
+from harness.references.certified_reference import relative_errors
+from harness.simulation.solution import Solution
 
 from .cases import SuiteCase, modes_at
 
 RELATIVE_TOLERANCE = 1e-10  # requested from the solver, of the FMU or of the tool
+OUTPUT_TOLERANCE = 1e-12  # of the run whose outputs are written
+AGREEMENT = 0.1  # of the tolerance of a case, to which the states of this run agree with the certified ones
 
 
 def write_suite(
@@ -44,7 +49,15 @@ def write_suite(
         write_case(case, folder / case.name, build)
         report(0.8 + 0.2 * number / len(cases))
     shutil.rmtree(build)
-    index = {case.name: {"model": case.model, "tolerance": case.tolerance, "catches": case.catches} for case in cases}
+    index = {
+        case.name: {
+            "model": case.model,
+            "states": list(case.states),
+            "tolerance": case.tolerance,
+            "catches": case.catches,
+        }
+        for case in cases
+    }
     (folder / "cases.json").write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8")
     shutil.copy(Path(__file__).with_name("check.py"), folder)
 
@@ -57,14 +70,16 @@ def write_case(case: SuiteCase, folder: Path, fmus: Path) -> None:
         shutil.copy(fmus / version / file, folder / version)
     solution = case.solve(fmus / "fmi2" / file)
     modes = modes_at(solution, solution.times)
-    columns = [solution.times, *solution.states.T, *([] if modes is None else [modes])]
-    headings = ["time", *case.states, *([] if modes is None else ["mode"])]
-    write_rows(folder / f"{case.name}_ref.csv", headings, zip(*(column.tolist() for column in columns), strict=True))
+    columns = {"time": solution.times, **dict(zip(case.states, solution.states.T, strict=True))}
+    columns |= {} if modes is None else {"mode": modes}
+    columns |= other_outputs(case, fmus / "fmi2" / file, solution)
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    write_rows(folder / f"{case.name}_ref.csv", list(columns), rows)
     if modes is not None:
         events = solution.events or []
         before = [solution.start_mode, *(mode for _, mode in events)]
-        rows = [(t, "mode", old, new) for (t, new), old in zip(events, before, strict=False)]
-        write_rows(folder / f"{case.name}_events.csv", ["time", "contact", "from", "to"], rows)
+        changes = [(t, "mode", old, new) for (t, new), old in zip(events, before, strict=False)]
+        write_rows(folder / f"{case.name}_events.csv", ["time", "contact", "from", "to"], changes)
     write_rows(folder / f"{case.name}_start.csv", ["name", "value"], case.values.items())
     if case.changes:
         write_rows(folder / f"{case.name}_in.csv", ["time", "F_ext"], input_rows(case))
@@ -73,6 +88,27 @@ def write_case(case: SuiteCase, folder: Path, fmus: Path) -> None:
     options = {"StartTime": start, "StopTime": stop, "StepSize": step, "RelTol": RELATIVE_TOLERANCE}
     write_rows(folder / f"{case.name}_ref.opt", [], options.items())
     (folder / "README.md").write_text(f"# {case.name}\n\n{case.catches}\n", encoding="utf-8")
+
+
+def other_outputs(case: SuiteCase, fmu: Path, solution: Solution) -> dict[str, np.ndarray]:
+    """Return the outputs (n,) that are neither states nor modes, from a run whose states agree with the certified ones.
+
+    Raises
+    ------
+    HarnessError
+        If they do not agree.
+    """
+    inputs = None
+    if case.changes:
+        time, force = zip(*input_rows(case), strict=True)
+        inputs = {"time": time, "F_ext": force}
+    start = float(solution.times[0])
+    run = simulate(fmu, case.values, start=start, times=solution.times, inputs=inputs, rtol=OUTPUT_TOLERANCE)
+    states = np.column_stack([run[name] for name in case.states])
+    error = relative_errors(states, solution.states).max()
+    if not error <= AGREEMENT * case.tolerance:
+        raise HarnessError(f"{case.name}: the FMU differs from the certified states by {error:.1e}")
+    return {name: run[name] for name in run.columns if name not in case.states and not name.startswith("mode")}
 
 
 def input_rows(case: SuiteCase) -> list[tuple[float, float]]:
