@@ -10,22 +10,19 @@ from . import conditions, contact_lcp, event_location, phase_repetition, planar_
 from .codes import DIVERGED, EPSILON, NEEDS_REPETITION, OK, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
 from .interpolant import largest_of
+from .rate_rounding import smallest_sizes
 from .step_end import OVERFLOW_LIMIT
 from .step_kind import has_law_without_sticking, has_narrow_features
 from .vectors import (
-    ContactVector,
     RateVector,
     StateVector,
     complete_rates,
     contact_indices,
-    dynamic_part,
     elementwise_max,
     error_size,
-    kinematic_rates,
     magnitude,
     max_of,
     planar_indices,
-    select_kinematic,
     slip_index,
     sum_of,
 )
@@ -33,10 +30,6 @@ from .vectors import (
 MAX_TRIES = 60  # attempts for one step; each one halves the step size
 ROUGH_ERROR, ROUGH_CHANGE = 0.5, 10.0  # relative error and change of states in a proposal that is roughly right
 SHORTEST_STEP = 16.0 * EPSILON  # share of the time since the start; the solver stalls at shorter ones
-# Rounding error of a rate, relative to the sum of its absolute terms, below which no step is rejected.  A product and a
-# sum round by half EPSILON each, as does each operand.  With 128 EPSILON, dop853 was allowed errors of 4e-10 in pacejka
-# at any tolerance below 1e-12.
-RATE_ROUNDING = 2.0 * EPSILON
 INTERPOLATION_ERROR = 10.0  # of a state at an event, relative to the solver tolerance
 
 
@@ -101,7 +94,8 @@ def accept_proposal(model, step):
         e = d / size2
         error = h * max_of(e) / tolerance
         if error > 1.0 and method.floor_share > 0.0:
-            e = relative_to_rounding(model, step, modes, y, d, size2, h)
+            least = smallest_sizes(model, step, t + h, y, modes, h)  # the proposed state may be unstable
+            e = d / elementwise_max(size2, least)
             error = h * max_of(e) / tolerance
         for i in planar_indices:
             error = planar_contact.larger_error(model, step, modes, h, y1, d, error, i)
@@ -142,19 +136,6 @@ def accept_proposal(model, step):
         step.t1 = roundoff.end_time(t, h)
     step.y1, step.f1 = y1, f1
     return OK
-
-
-def relative_to_rounding(
-    model, step, modes: ContactVector, y: StateVector, d: StateVector, size: StateVector, h
-) -> StateVector:
-    """Return the errors d relative to the sizes of the states, of which rounding errors of the rates are a part.
-
-    They are errors of velocities, and of positions by these.
-    """
-    terms = model.rate_magnitudes(step.t0 + h, y, modes)  # the proposed state may be unstable
-    rounding = dynamic_part(RATE_ROUNDING * h / step.tolerance * terms)
-    least = select_kinematic(h * kinematic_rates(rounding), rounding)
-    return d / elementwise_max(size, least)
 
 
 def raise_floor_by_proposal(

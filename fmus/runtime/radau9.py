@@ -12,6 +12,7 @@ differential equations solved by Radau methods, J. Comp. Appl. Math. 111 (1999) 
 
 from math import nan
 
+from .rate_rounding import smallest_sizes
 from .vectors import (
     ContactVector,
     RateVector,
@@ -41,6 +42,7 @@ POWER, SAFETY, SHRINK, GROW = 1.0 / 6.0, 0.9, 0.12, 4.0
 MAX_ITERATIONS = 7
 NEWTON_TOLERANCE = 0.1  # error of the iteration, in multiples of the tolerance
 CAUTIOUS_STEPS, CAUTIOUS_GROWTH = 2, 1.5  # after a divergence of the iteration
+CHANGE_ROUNDING = 100.0  # of a change in the iteration, to which 25 rates contribute; in rounding errors of a rate
 HOPELESS, LARGE = 10.0, 1e100  # excess over it, predicted for the last iteration; change that ends the iteration
 
 # fmt: off
@@ -195,6 +197,7 @@ class Radau9:
         scale = error_size(y)
         scale = elementwise_max(control.error_scale_floor, scale)
         tolerance = NEWTON_TOLERANCE * step.tolerance
+        u1 = w1
         has_converged, last_change, quotient, share, iterations = False, 1.0, 1.0, 1.0, 0
         for turn in range(MAX_ITERATIONS):
             y1 = y + stage_change(h, f, C1, A11, A12, A13, A14, A15, z1, z2, z3, z4, z5, z1)
@@ -235,8 +238,9 @@ class Radau9:
             u3 = dynamic_part(magnitude(u3))
             u4 = dynamic_part(magnitude(u4))
             u5 = dynamic_part(magnitude(u5))
-            u1 = dynamic_part((u1 + u2 + u3 + u4 + u5) / scale)
-            change = max_of(u1) / tolerance
+            u1 = dynamic_part(u1 + u2 + u3 + u4 + u5)
+            u2 = dynamic_part(u1 / scale)
+            change = max_of(u2) / tolerance
             if not change < LARGE:  # also for NaN
                 break
             if turn > 0:
@@ -253,6 +257,12 @@ class Radau9:
                 break
             last_change = change
         control.stages = STAGES * iterations
+        if not has_converged and control.floor_share > 0.0:
+            # while all contacts stick, rates are rounding errors, and no iteration makes its change smaller
+            least = smallest_sizes(model, step, t + h, y, modes, h)
+            least = CHANGE_ROUNDING / NEWTON_TOLERANCE * least
+            u1 = dynamic_part(u1 / elementwise_max(scale, least))
+            has_converged = max_of(u1) <= tolerance
         if not has_converged:
             self.n_cautious = CAUTIOUS_STEPS
             e = nan * y
@@ -280,6 +290,12 @@ class Radau9:
             control.stages += 1
             r = r + (f8 - f)
             e = solve_factored(real, r)
+            d = magnitude(e)
+            d = d / size
+            error = h * max_of(d) / step.tolerance
+        if error > 1.0 and control.floor_share > 0.0:  # as in method_step
+            least = smallest_sizes(model, step, t + h, y, modes, h)
+            size = elementwise_max(size, least)
             d = magnitude(e)
             d = d / size
             error = h * max_of(d) / step.tolerance
