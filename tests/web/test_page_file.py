@@ -49,8 +49,10 @@ def test_only_one_model_is_compiled_before_the_first_picture(page):
     count = (
         "const { instantiate } = WebAssembly; globalThis.compiled = 0; globalThis.first = null;"
         "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all));"
-        "const look = () => { if (document.body && !document.body.classList.contains('starting')) first ??= compiled;"
-        "requestAnimationFrame(look) }; requestAnimationFrame(look)"
+        "new MutationObserver(changes => {"
+        "if (changes.some(each => each.target === document.body && each.oldValue?.includes('starting'))"
+        " && !document.body.classList.contains('starting')) first ??= compiled"
+        "}).observe(document, { subtree: true, attributeFilter: ['class'], attributeOldValue: true })"
     )
     script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=count)
     page.open(anew=True)

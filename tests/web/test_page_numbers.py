@@ -41,10 +41,10 @@ def read_numbers(text):
 
 
 def shows(text, *values):
-    """Whether a text has exactly these numbers, each rounded to its last digit."""
+    """Whether a text has exactly these numbers, rounded to their last digit; a value may be approximate."""
     numbers = read_numbers(text)
     return len(numbers) == len(values) and all(
-        abs(number - value) <= half_digit * (1 + 1e-6)
+        number == (value if hasattr(value, "expected") else pytest.approx(value, rel=0, abs=half_digit * (1 + 1e-6)))
         for (number, half_digit), value in zip(numbers, values, strict=True)
     )
 
@@ -133,7 +133,8 @@ def creeps_numbers(x_m=0.01):
         ode23(model, values, 1e-3, stop=BELT_STOP).statistics.steps
         for model, values in (("pacejka", {"x_m": x_m}), ("stickslip", {}))
     ]
-    return [x_m, x - run["x"][0], t, exact.events.t[modes != 0][0], steps[0], 10, 3, steps[1]]
+    creeping = pytest.approx(steps[0], rel=1e-3)  # sin and atan differ in the last bit between machines and the page
+    return [x_m, x - run["x"][0], t, exact.events.t[modes != 0][0], creeping, 10, 3, steps[1]]
 
 
 def swings_numbers():
@@ -176,7 +177,7 @@ def test_a_steeper_curve_creeps_less_and_costs_more(still):
     type_number(still, "creeps", "x_m", "0.001")
     steep, smooth = creeps_numbers(0.001), creeps_numbers(0.01)
     assert steep[1] < 0.3 * smooth[1]
-    assert steep[4] > 3 * smooth[4]
+    assert steep[4].expected > 3 * smooth[4].expected
     assert shows(text(still, "creeps"), *steep)
 
 

@@ -34,4 +34,5 @@ host?.addEventListener("click", (event) => { // in a page embedded in a report, 
 });
 globalThis.app = { library, opening, stories, runs: explore.runs, plots: explore.diagrams.plots, seek: (t) => explore.seek(t), state: () => explore.state }; // for tests and the console
 await Promise.all([opening?.start(), explore.follow(location.hash)]);
+await new Promise(requestAnimationFrame); // the first picture is drawn before another model is compiled
 for (const story of stories) await story.start();
