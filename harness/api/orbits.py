@@ -68,9 +68,7 @@ def orbit(
     """
     from ..studies.orbit.study import compute_orbits
 
-    if over is not None and len(over) != 1:
-        raise SceneError(f"over has {len(over)} parameters: give one, as in {{'v_belt': (0.1, 3)}}")
-    axes = expand_axes(over or {}, DEFAULT_VALUES)
+    axes = {} if over is None else expand_axes(over, DEFAULT_VALUES, 1)
     name, row = next(iter(axes.items()), ("", ()))
     return compute_orbits(resolve_motion(source, values), name, [*map(float, row)], reporter(progress))
 
@@ -93,16 +91,13 @@ def map_motions(
 
     Parameters
     ----------
-    source, values
+    source, values, progress
         As in `orbit`.
     over : mapping
         One or two parameters and their increasing values (n,); two ends for 21 values.
     workers : int, optional
         Number of worker processes; by default all runs are done in this process, and by the command in one process for
         each processor.
-    progress : callable or False, optional
-        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
-        switches it off.
 
     Returns
     -------
@@ -111,10 +106,8 @@ def map_motions(
 
     Raises
     ------
-    SceneError
-        If the source or an argument is not valid.
-    HarnessError
-        If the FMU is not native, or cannot start from given states.
+    SceneError, HarnessError
+        As in `orbit`.
 
     Examples
     --------
@@ -123,9 +116,7 @@ def map_motions(
     """
     from ..studies.motion_map.study import compute_map
 
-    if len(over) not in (1, 2):
-        raise SceneError(f"over has {len(over)} parameters: give one or two, as in {{'v_belt': (0.1, 3)}}")
-    axes = expand_axes(over, DEFAULT_GRID)
+    axes = expand_axes(over, DEFAULT_GRID, 2)
     return compute_map(resolve_motion(source, values), axes, workers, reporter(progress))
 
 
@@ -137,10 +128,13 @@ def resolve_motion(source: "str | Path", values: Mapping[str, float | str] | Non
     return replace(spec, values={**spec.values, **(values or {})})
 
 
-def expand_axes(over: "Mapping[str, ArrayLike]", count: int) -> "dict[str, np.ndarray]":
-    """Return the values of each parameter; `count` values between two ends."""
+def expand_axes(over: "Mapping[str, ArrayLike]", count: int, most: int) -> "dict[str, np.ndarray]":
+    """Return the values of each of at most `most` parameters; `count` values between two ends."""
     import numpy as np
 
+    if not 1 <= len(over) <= most:
+        number = "one" if most == 1 else "one or two"
+        raise SceneError(f"over has {len(over)} parameters: give {number}, as in {{'v_belt': (0.1, 3)}}")
     axes = {name: np.asarray(row, dtype=float) for name, row in over.items()}
     for name, row in axes.items():
         if len(row) == 1:

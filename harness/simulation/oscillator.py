@@ -4,13 +4,13 @@ The coordinates c = B^T y leave out translations that change no force, as of a s
 phase angle of a force.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import cached_property
 from itertools import chain, islice
-from math import inf
-from types import TracebackType
-from typing import Any, NamedTuple, Self
+from math import inf, pi
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,8 @@ from .variable_values import enumeration_labels, variable_unit
 from .variational import VariationalRun, state_variables
 
 RTOL = "solver.rtol"
-DEFAULTS = {METHOD: "dop853", RTOL: 1e-12}  # of the solver, unless a user sets others
+METHODS = {"exact": "dop853", "ode23": "dop853", "ode45": "dop853", "rodas": "radau9"}  # as accurate as RTOL below
+DEFAULT_RTOL = 1e-12
 MAX_STEPS = 200_000  # internal steps of a motion
 MAX_ITERATIONS = 30  # of Newton's method
 SAMPLED = 3  # points of a motion at which derivatives are compared
@@ -50,6 +51,35 @@ class Point(NamedTuple):
         return 0 in self.modes
 
 
+class SteadySliding(NamedTuple):
+    """Steady sliding: its states (n,), and eigenvalues (r,) in 1/s of small motions around it."""
+
+    y: np.ndarray
+    eigenvalues: np.ndarray
+
+    @property
+    def growth(self) -> float:
+        """Return the growth rate of small motions in 1/s."""
+        return float(self.eigenvalues.real.max())
+
+    @property
+    def frequency(self) -> float:
+        """Return the angular frequency of small motions in rad/s; zero if they do not oscillate."""
+        return float(np.abs(self.eigenvalues.imag).max())
+
+    @property
+    def turn_time(self) -> float:
+        """Return about the time of a turn in s."""
+        return 2.0 * pi / (self.frequency or float(np.abs(self.eigenvalues).max()))
+
+
+@contextmanager
+def open_oscillator(spec: RunSpec, varied: Sequence[str] = ()) -> "Iterator[Oscillator]":
+    """Open an oscillator; its parameters are those of `Oscillator`."""
+    with ExitStack() as resources:
+        yield Oscillator(spec, varied, resources)
+
+
 class Oscillator:
     """A native FMU whose motions start at given states.
 
@@ -59,11 +89,13 @@ class Oscillator:
         Native FMU with directional derivatives, and values.
     varied : sequence of str
         Parameters that `set_point` changes.
+    resources : contextlib.ExitStack
+        Closes the instances.
 
     Attributes
     ----------
-    states : tuple of str
-        Names of the states.
+    states, rates : tuple of str
+        Names of the states and of their rates.
     start : numpy.ndarray
         States (n,) at the start of the source.
     basis : numpy.ndarray
@@ -71,7 +103,15 @@ class Oscillator:
     phase : int or None
         Index of the state that is the phase angle of a force.
     coordinate : int
-        Index of the state that measures a motion, and whose maximum is the section of motions without events.
+        Index of the state that measures a motion.
+    gauge : numpy.ndarray
+        Weights of the states (n,) in this one without translations, as of a sled against its driver.
+    displacement : numpy.ndarray
+        Change of the states (n,) that changes it by 1.
+    speeds : numpy.ndarray
+        Ones (n,) at the states that are rates of others, zeros elsewhere.
+    n_modes : int
+        Number of contacts.
     n_runs : int
         Number of runs up to now.
 
@@ -83,95 +123,60 @@ class Oscillator:
         If its friction law has no events, or its states cannot be set.
     """
 
-    def __init__(self, spec: RunSpec, varied: Sequence[str] = ()) -> None:
+    def __init__(self, spec: RunSpec, varied: Sequence[str], resources: ExitStack) -> None:
+        self.resources, self.varied, self.n_runs = resources, tuple(varied), 0
         description, self.folder = read_description(spec.fmu), unpack_once(spec.fmu)
-        variables = {variable.name: variable for variable in description.modelVariables}
-        settable = [name for name, item in variables.items() if item.causality == "parameter" and item.type == "Real"]
-        check_names("parameter", varied, settable)
+        self.variables = {variable.name: variable for variable in description.modelVariables}
+        self.parameters = [
+            name for name, item in self.variables.items() if item.causality == "parameter" and item.type == "Real"
+        ]
+        check_names("parameter", varied, self.parameters)
         for name in varied:
             if name in spec.values:
                 raise SceneError(f"{name} is both varied and set; remove one of them")
-        self.variables, self.varied, self.n_runs = variables, tuple(varied), 0
-        self.parameters = settable
         self.states = tuple(state.name for state in state_variables(description))
         self.rates = tuple(unknown.variable.name for unknown in description.derivatives)
-        self.units = {name: variable_unit(variable) for name, variable in variables.items()}
-        methods = enumeration_labels(variables[METHOD]).values() if METHOD in variables else ()
-        values = {
-            name: value for name, value in DEFAULTS.items() if name in variables and (name == RTOL or value in methods)
-        }
-        self.spec = replace(spec, values=values | dict(spec.values), start=0.0, stop=STOP, follow=False)
+        self.speeds = np.isin(self.states, self.rates).astype(float)
+        self.units = {name: variable_unit(variable) for name, variable in self.variables.items()}
+        values = choose_solver(self.variables) | dict(spec.values)
+        self.spec = replace(spec, values=values, start=0.0, stop=STOP, follow=False)
+        self.settings = {variable.name: value for variable, value in resolve_settings(self.spec, self.variables)}
+        check_has_events(spec.fmu, self.variables, self.settings)
+        angles = [
+            name
+            for name in self.parameters
+            if self.variables[name].variability == "fixed" and self.units[name] == "rad"
+        ]
+        self.initial = tuple(dict.fromkeys([*find_start_parameters(description, self.states), *angles]))
         modes = tuple(read_model_data(spec.fmu).contacts.values())
-        reals = [*dict.fromkeys((*self.states, *self.rates, "events.t_last", "solver.t_next"))]
+        reals = [*dict.fromkeys((*self.states, *self.rates, "solver.t_next"))]
         self.positions = [[reals.index(name) for name in group] for group in (self.states, self.rates)]
-        self.n_reals, self.n_modes = len(reals), len(modes)
-        initial = find_start_parameters(description, self.states)
-        angles = [name for name in settable if variables[name].variability == "fixed" and self.units[name] == "rad"]
-        self.initial = tuple(dict.fromkeys([*initial, *angles]))
-        self.exchange: FmuInstance | None = None
-        self.equilibria: list[np.ndarray] = []
-        self.settings = {variable.name: value for variable, value in resolve_settings(self.spec, variables)}
-        check_has_events(spec.fmu, variables, self.settings)
-        with ExitStack() as resources:  # an open instance keeps standard error redirected
-            opened = open_session(self.spec, (*self.varied, *self.initial), [*reals, *modes, "events.count"])
-            session = resources.enter_context(opened)
-            assert isinstance(session, Session)
-            self.session, self.instance = session, session.instance
-            self.find_coordinates_of_start(len(initial))
-            self.resources = resources.pop_all()
-
-    def find_coordinates_of_start(self, n_states: int) -> None:
-        """Find how parameters, of which the first `n_states` set states, move the start, and the coordinates."""
-        self.set_point([self.default(name) for name in self.varied])
+        self.n_modes, read = len(modes), [*modes, *["events.count"] * bool(modes), *reals]
+        session = resources.enter_context(open_session(self.spec, (*self.varied, *self.initial), read))
+        assert isinstance(session, Session)
+        self.session, self.instance = session, session.instance
+        self.last_equilibrium: np.ndarray | None = None
+        self.set_point([self.default(name) for name in varied])
         self.offsets = np.array([self.default(name) for name in self.initial])
         self.turned = np.zeros((len(self.states), len(self.initial)))
         self.start = self.begin_with(self.offsets).y
-        steps = np.eye(len(self.initial))
-        columns = [self.begin_with(self.offsets + step).y - self.start for step in steps]
+        columns = [self.begin_with(self.offsets + step).y - self.start for step in np.eye(len(self.initial))]
         self.matrix = np.array(columns).reshape(-1, len(self.states)).T
         self.inverse = np.linalg.pinv(self.matrix)
-        self.find_phase_angle(range(n_states, len(self.initial)))
-        self.inverse = np.linalg.pinv(self.matrix)
         self.find_coordinates()
-
-    def find_phase_angle(self, parameters: Sequence[int]) -> None:
-        """Find the parameter, by its index, that adds to a phase angle which itself always starts at zero.
-
-        A motion and one that starts with the angle that it has reached then have the same rates.
-        """
-        for y in islice(self.sliding_states(), 1):
-            for k in np.flatnonzero(~self.matrix.any(axis=1)):
-                first = self.begin(y)
-                h = 0.3 / abs(first.f[k]) if first.f[k] else 1.0
-                later = self.step(0.0, h)
-                shift = self.inverse @ (later.y - self.start)
-                for j in parameters:
-                    angle = (later.y[k] - first.y[k]) * np.eye(len(self.initial))[j]
-                    rates = self.begin_with(self.offsets + shift + angle).f
-                    if np.allclose(rates, later.f, rtol=1e-6, atol=0.0):
-                        self.turned[k, j] = self.matrix[k, j] = 1.0
-                        self.start = self.begin_with(self.offsets).y
-                        break
 
     def default(self, name: str) -> float:
         """Return the value of a parameter of the source."""
         return float(self.settings.get(name, self.variables[name].start or 0.0))
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.resources.close()
-
-    # ---- motions
-
     def set_point(self, point: Sequence[float]) -> None:
         """Set the values of the varied parameters."""
         self.point = tuple(map(float, point))
 
+    # ---- motions
+
     def begin_with(self, initial: np.ndarray) -> Point:
         """Start a motion with values of the parameters that set the states."""
-        self.n_runs += 1
         self.shift = self.turned @ initial
         try:
             self.session.start((*self.point, *initial.tolist()))
@@ -190,14 +195,15 @@ class Oscillator:
     def read(self, t: float) -> Point:
         """Return the present point; `t_next` is the end of the next internal step."""
         values = self.session.read()
-        reals, (*modes, count) = np.array(values[: self.n_reals]), values[self.n_reals :]
-        self.t_event, self.t_next = values[self.n_reals - 2 : self.n_reals]
-        return Point(
-            t, reals[self.positions[0]] + self.shift, reals[self.positions[1]], tuple(map(int, modes)), int(count)
-        )
+        modes, reals = values[: self.n_modes], np.array(values[self.n_modes + bool(self.n_modes) :])
+        self.t_next = float(reals[-1])
+        n_changes = int(values[self.n_modes]) if modes else 0
+        y = reals[self.positions[0]] + self.shift
+        return Point(t, y, reals[self.positions[1]], tuple(map(int, modes)), n_changes)
 
     def step(self, t: float, h: float) -> Point:
         """Go on from a time by h, in s."""
+        self.n_runs += t == 0.0
         try:
             self.instance.step(t, h)
         except CALL_FAILURES as error:
@@ -224,8 +230,6 @@ class Oscillator:
 
     def differentiate(self, y: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (n,) after a time in s, and their derivatives (n, n) by the states y, or NaN."""
-        if self.exchange is None:
-            self.exchange = self.resources.enter_context(open_instance(replace(self.spec, exchange=True)))
         initial = dict(zip(self.initial, self.initial_values(y).tolist(), strict=True))
         spec = replace(
             self.spec,
@@ -239,12 +243,12 @@ class Oscillator:
         slopes = np.where(solution.left[0] == solution.right[0], solution.left[0], np.nan)
         return solution.values[0], slopes.T @ self.inverse
 
-    # ---- coordinates
+    @cached_property
+    def exchange(self) -> FmuInstance:
+        """Return an instance for model exchange."""
+        return self.resources.enter_context(open_instance(replace(self.spec, exchange=True)))
 
-    def jacobian(self, y: np.ndarray) -> np.ndarray:
-        """Return the derivatives (n, n) of the rates by the states."""
-        self.begin(y)
-        return self.read_jacobian()
+    # ---- coordinates
 
     def read_jacobian(self) -> np.ndarray:
         """Return the derivatives (n, n) of the rates by the states at the present point."""
@@ -256,23 +260,28 @@ class Oscillator:
     def sliding_states(self) -> Iterator[np.ndarray]:
         """Yield states near the start in which no contact sticks: there the speeds are changed by other rates."""
         rates = self.begin(self.start).f
-        is_speed = np.isin(self.states, self.rates)
         sizes = sorted({*np.abs(rates).tolist()} - {0.0}) or [1.0]
-        moved = [self.start + sign * size * is_speed for size in sizes for sign in (1, -1)]
+        different = np.cumsum(self.speeds) * self.speeds  # or bodies stay at rest against each other
+        moved = [self.start + sign * size * different for size in sizes for sign in (1, -1)]
         yield from (y for y in (self.start, *moved) if not self.begin(y).sticks)
 
     def find_coordinates(self) -> None:
         """Find the coordinates that repeat."""
-        n, states = len(self.states), [*self.sliding_states()]
+        for state, is_speed, row in zip(self.states, self.speeds, self.matrix, strict=True):
+            if is_speed and not row.any():
+                raise self.has_no_start(state)
+        n, name, states = len(self.states), self.spec.fmu.name, [*self.sliding_states()]
         if not states:
-            raise HarnessError(f"{self.spec.fmu.name} has no motion near its start: choose another start")
+            raise HarnessError(f"{name} has a contact that sticks in all states near its start: choose another start")
         rates = self.begin(states[0]).f
         points = (point for y in states for point in islice(self.follow(y), 0, SAMPLED * 10, 10) if not point.sticks)
         jacobians = np.array([self.read_jacobian() for _ in points])
         is_constant = ~jacobians.any(axis=(0, 2))
-        is_angle = np.array([self.units[name] == "rad" for name in self.states])
+        is_angle = np.array([self.units[state] == "rad" for state in self.states])
         phases = np.flatnonzero(is_constant & is_angle & (rates != 0.0) & jacobians.any(axis=(0, 1)))
         self.phase = int(phases[0]) if len(phases) else None
+        if self.phase is not None and not self.matrix[self.phase].any():
+            self.find_phase_parameter(self.phase, states[0])
         kept = [i for i in range(n) if i != self.phase]
         _, sizes, rows = np.linalg.svd(np.concatenate(jacobians)[:, kept])
         rank = int(np.count_nonzero(sizes > 1e-10 * sizes[0]))
@@ -280,24 +289,44 @@ class Oscillator:
         self.basis[kept] = np.eye(rank) if rank == len(kept) else rows[:rank].T
         measured = np.flatnonzero(self.basis.any(axis=1) & ~is_constant)
         if not len(measured):
-            raise HarnessError(f"{self.spec.fmu.name} has no forces that depend on its states, and no oscillations")
+            raise HarnessError(f"{name} has no force that depends on a position or a speed, and so no oscillations")
         self.coordinate = int(measured[0])
         row = self.basis[self.coordinate]
         self.gauge = self.basis @ row / (row @ row)
+        self.displacement = self.gauge / (self.gauge @ self.gauge)
         set_by = np.column_stack([self.basis, np.eye(n)[:, phases[:1]]])
         reduced = set_by.T @ self.matrix
         self.inverse = np.linalg.pinv(reduced) @ set_by.T  # translations stay as they are at the start
-        for name, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
+        for state, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
             if np.abs(missing).max() > 1e-9:
-                raise HarnessError(
-                    f"{self.spec.fmu.name}: no parameter sets {name} at the start: declare one, as in start={name}0 of "
-                    f"the state, with {name}0 a Fixed of the model"
-                )
+                raise self.has_no_start(state)
+
+    def has_no_start(self, state: str) -> HarnessError:
+        """Return the error of a model without a parameter that sets a state."""
+        return HarnessError(
+            f"{self.spec.fmu.name}: no parameter sets {state} at the start: declare one, as in start={state}_0 of the "
+            f"state, with {state}_0 a Fixed of the model"
+        )
+
+    def find_phase_parameter(self, phase: int, y: np.ndarray) -> None:
+        """Find the parameter that adds to a phase angle which itself always starts at zero.
+
+        A motion and one that starts with the angle that it has reached then have the same rates.
+        """
+        first = self.begin(y)
+        later = self.step(0.0, 0.3 / abs(first.f[phase]))
+        reached = self.offsets + self.inverse @ (later.y - self.start)
+        for j in np.flatnonzero([self.units[name] == "rad" for name in self.initial]):
+            turned = reached + (later.y[phase] - first.y[phase]) * np.eye(len(self.initial))[j]
+            if np.allclose(self.begin_with(turned).f, later.f, rtol=1e-6, atol=0.0):
+                self.turned[phase, j] = self.matrix[phase, j] = 1.0
+                self.start = self.begin_with(self.offsets).y
+                return
 
     @property
     def forced_period(self) -> float | None:
         """Return the period of the force in s; None without a force."""
-        return None if self.phase is None else 2.0 * np.pi / abs(float(self.begin(self.start).f[self.phase]))
+        return None if self.phase is None else 2.0 * pi / abs(float(self.begin(self.start).f[self.phase]))
 
     def reduce(self, y: np.ndarray) -> np.ndarray:
         """Return the coordinates (r,) of states or rates."""
@@ -307,16 +336,21 @@ class Oscillator:
         """Return the value, without translations, of the state that measures a motion."""
         return float(self.gauge @ y)
 
-    # ---- equilibria
+    @property
+    def is_one_body(self) -> bool:
+        """Return whether this is one body with one contact, whose motions fill a plane."""
+        return self.basis.shape[1] == 2 and self.speeds.sum() == 1 and self.n_modes == 1
 
-    def find_equilibrium(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the states (n,) of steady sliding and their eigenvalues (r,) in 1/s, by Newton's method, or None."""
+    # ---- steady sliding
+
+    def find_steady_sliding(self) -> SteadySliding | None:
+        """Return steady sliding, by Newton's method."""
         if self.phase is not None:
             return None
-        for y in chain(self.equilibria[-1:], self.sliding_states()):
+        for y in chain([] if self.last_equilibrium is None else [self.last_equilibrium], self.sliding_states()):
             for _ in range(MAX_ITERATIONS):
                 point = self.begin(y)
-                matrix = self.basis.T @ self.jacobian(y) @ self.basis
+                matrix = self.basis.T @ self.read_jacobian() @ self.basis
                 if point.sticks or not matrix.any():
                     break
                 change = self.basis @ np.linalg.lstsq(matrix, -self.reduce(point.f), rcond=None)[0]
@@ -325,13 +359,25 @@ class Oscillator:
                 y = y + change
             scale = max(1e-3, float(np.abs(point.f).max()))
             if not point.sticks and np.abs(self.reduce(point.f)).max() <= 1e-10 * scale:
-                eigenvalues = np.linalg.eigvals(matrix)
+                steady = SteadySliding(y, np.linalg.eigvals(matrix))
                 self.begin(y)
-                later = self.step(0.0, 1.0 / float(np.abs(eigenvalues).max()))
-                if not later.n_changes:  # it slides on, with a speed that is not zero by rounding
-                    self.equilibria = [y]  # a good guess at the next point
-                    return y, eigenvalues
+                if not self.step(0.0, 1.0 / float(np.abs(steady.eigenvalues).max())).n_changes:
+                    # it slides on, with a speed that is not zero by rounding
+                    self.last_equilibrium = y  # a good guess at the next point
+                    return steady
         return None
+
+
+def choose_solver(variables: Mapping[str, Any]) -> dict[str, str | float]:
+    """Return method and tolerance of the solver, unless a user sets others."""
+    if RTOL not in variables:
+        return {}
+    if METHOD not in variables:
+        return {RTOL: DEFAULT_RTOL}
+    labels = enumeration_labels(variables[METHOD])
+    default = labels[int(variables[METHOD].start)]
+    method = METHODS.get(default, default)
+    return {RTOL: DEFAULT_RTOL, METHOD: method if method in labels.values() else default}
 
 
 def find_start_parameters(description: Any, states: Sequence[str]) -> tuple[str, ...]:

@@ -11,24 +11,29 @@ R. I. Leine, D. H. van Campen, B. L. van de Vrande, Bifurcations in nonlinear di
 23 (2000) 105-164.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf, nan, pi
+from math import inf, nan
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from ..errors import HarnessError
-from .oscillator import MAX_ITERATIONS, Oscillator, Point
+from .oscillator import MAX_ITERATIONS, Oscillator, Point, SteadySliding
 
 NEUTRAL = 1e-9  # growth of an amplitude in a turn that is none
 REPEATS = 1e-9  # relative difference of states that repeat
+COLLAPSED = 1e-4  # share of the first rates at which an orbit has shrunk to steady sliding
 CLOSED = 1e-8  # the same of the ends of an orbit
 MAX_RELEASES, MAX_TURNS, MAX_PERIODS = 64, 64, 256  # until a motion has repeated
 NEWTON_PERIODS = (16, 64, MAX_PERIODS)  # of a force, after which Newton's method is tried
 MAX_MULTIPLE = 8  # slips, or periods of the force, of the longest period
 CHUNKS = 12  # communication steps in a turn
-GRAZING = 1e-7  # relative accuracy of the largest amplitude without sticking
+GRAZING = 1e-7  # relative distance from the largest amplitude of orbits that do not stick
+BESIDE = 1e-6  # relative difference of the speed of a body that sticks at once
+JUMP = 1e-5  # growth of an amplitude at its zero that is a jump
+ROOT_RTOL = 1e-13  # relative accuracy of zeros
 SCANNED = 16  # amplitudes between which orbits that do not stick are sought
 REST, SLIDING, CYCLE, IRREGULAR = "rest", "sliding", "cycle", "irregular"
 
@@ -74,7 +79,7 @@ class LongMotion:
     kind : str
         REST, SLIDING (without sticking), CYCLE or IRREGULAR.
     y, period : numpy.ndarray, float
-        Guess of the orbit: states (n,) where it slides, and period in s.
+        Guess of the orbit: states (n,) where it slides, and period in s, NaN at rest.
     n_sticks : int
         Number of sticks in this period.
     closest : float
@@ -102,12 +107,12 @@ class ReturnMap:
 
     Attributes
     ----------
-    size : float
-        Amplitude from which a motion sticks, as far as known.
+    reversal : float
+        Last distance of the speed at which the slip reverses from that of steady sliding.
     """
 
     def __init__(self, oscillator: Oscillator) -> None:
-        self.oscillator, self.size = oscillator, 1.0
+        self.oscillator, self.reversal = oscillator, 1.0
 
     # ---- what a motion ends in
 
@@ -116,14 +121,15 @@ class ReturnMap:
         return self.run_free(y) if self.oscillator.phase is None else self.run_forced(y)
 
     def run_free(self, y: np.ndarray) -> LongMotion:
-        """Follow a motion until the states at the ends of two sticks are the same."""
-        path, releases, turns, closest = list[Point](), list[Point](), 0, inf
-        for point in self.oscillator.follow(y):
-            last = path[-1] if path else point
-            path.append(point)
-            turns += self.is_maximum(last, point)
-            if last.sticks and not point.sticks:
-                new, turns = point._replace(t=self.oscillator.t_event), 0
+        """Follow a motion until the states at the ends of two sticks are the same, or it turns without sticking."""
+        path, releases, maxima, closest = list[Point](), list[Point](), list[tuple[Point, Point]](), inf
+        for new in self.oscillator.follow(y):
+            last = path[-1] if path else new
+            path.append(new)
+            if self.is_maximum(last, new):
+                maxima.append((last, new))
+            if last.sticks and not new.sticks:
+                maxima.clear()
                 scale = max(float(np.abs(self.oscillator.reduce(item.y)).max()) for item in path)
                 for old in releases[: -MAX_MULTIPLE - 1 : -1]:
                     if old.modes == new.modes:
@@ -131,10 +137,11 @@ class ReturnMap:
                         if closest <= REPEATS:
                             return self.describe_cycle([item for item in path if item.t >= old.t], new.t - old.t)
                 releases.append(new)
-            if point.modes and not any(point.modes) and not self.oscillator.reduce(point.f).any():
-                return LongMotion(REST, point.y)
-            if turns > MAX_TURNS:
-                return LongMotion(SLIDING, point.y)
+            if new.modes and not any(new.modes) and not self.oscillator.reduce(new.f).any():
+                return LongMotion(REST, new.y)
+            if len(maxima) > MAX_TURNS:
+                before, maximum = (self.locate_turn(*pair) for pair in maxima[-2:])
+                return LongMotion(SLIDING, maximum.y, maximum.t - before.t)
             if len(releases) > MAX_RELEASES:
                 break
         return LongMotion(IRREGULAR, path[-1].y, closest=closest)
@@ -197,6 +204,7 @@ class ReturnMap:
             If it does not converge.
         """
         oscillator, basis, guess = self.oscillator, self.oscillator.basis, period
+        speed = float(np.abs(oscillator.reduce(oscillator.begin(y).f)).max())
         is_free = oscillator.phase is None
         for _ in range(MAX_ITERATIONS):
             end, slopes = oscillator.differentiate(y, period)
@@ -206,6 +214,8 @@ class ReturnMap:
             matrix = monodromy - np.eye(len(monodromy))
             if is_free:
                 flow = oscillator.reduce(oscillator.begin(y).f)
+                if np.abs(flow).max() < COLLAPSED * speed:
+                    raise NoOrbitError("Newton's method ends in steady sliding")
                 ahead = oscillator.reduce(oscillator.begin(end).f)
                 matrix = np.block([[matrix, ahead[:, None]], [flow, np.zeros(1)]])
                 residual = np.append(residual, 0.0)
@@ -268,105 +278,155 @@ class ReturnMap:
             speed(max(float(root), 1e-12 * h))
         return found[0]._replace(t=last.t + found[0].t)
 
-    # ---- one oscillator that slides around steady sliding
+    # ---- one body with one contact, around steady sliding
 
-    def pass_maximum(self, y: np.ndarray, amplitude: float, duration: float) -> tuple[Point, Point] | None:
-        """Return points before and after the maximum of one turn about steady sliding y, of about a duration in s.
+    def start_sticking(self, steady: SteadySliding) -> np.ndarray | None:
+        """Return states beside steady sliding from which the body sticks at once; None if there are none.
 
-        None if the motion changes its mode or does not turn.
+        Its speed is that at which the slip reverses; its position is one at which friction can hold it.
         """
-        last = self.oscillator.begin(y + amplitude * self.oscillator.gauge)
-        for _ in range(4 * CHUNKS):
-            point = self.oscillator.step(last.t, duration / CHUNKS)
-            if point.n_changes:
+        oscillator = self.oscillator
+        y, modes = steady.y, oscillator.begin(steady.y).modes
+
+        def reverses(change: float) -> bool:
+            return oscillator.begin(y + change * oscillator.speeds).modes != modes
+
+        sizes = [self.reversal * 4.0**k for k in range(-1, 1)] + [4.0**k for k in range(-30, 31)]
+        changes = (sign * size for size in sizes for sign in (1.0, -1.0))
+        high = next(filter(reverses, changes), None)
+        if high is None:
+            return None
+        low = 0.0
+        while abs(high - low) > BESIDE * abs(high):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if reverses(middle) else (middle, high)
+        self.reversal = abs(high)
+        for _ in range(MAX_ITERATIONS):
+            end = oscillator.begin(y + high * oscillator.speeds)
+            begin = oscillator.begin(y + low * oscillator.speeds)
+            slope = float(oscillator.speeds @ oscillator.read_jacobian() @ oscillator.displacement)
+            rates = [float(oscillator.speeds @ point.f) for point in (begin, end)]
+            if end.sticks or rates[0] * high > 0.0 > rates[1] * high:
+                return end.y
+            if not slope:
                 break
-            if last.t and self.is_maximum(last, point):
+            y = y - 0.5 * sum(rates) / slope * oscillator.displacement
+        return None
+
+    def turn_after_stick(self, steady: SteadySliding) -> tuple[Point, Point] | None:
+        """Start a motion that sticks, and go on to its first maximum; return the points before and after it.
+
+        None if it does not stick, or has no maximum afterwards.
+        """
+        y = self.start_sticking(steady)
+        if y is None:
+            return None
+        last, released = self.oscillator.begin(y), inf
+        for point in self.oscillator.follow(y):
+            if last.sticks and not point.sticks:
+                released = point.t
+            if point.t > released and self.is_maximum(last, point):
                 return last, point
+            if point.t - MAX_TURNS * steady.turn_time > released or (released == inf and point.n_changes > 1):
+                return None
             last = point
         return None
 
-    def turn(self, y: np.ndarray, amplitude: float, duration: float) -> tuple[float, float]:
-        """Return the amplitude after one turn, and its time in s; NaN if the motion changes its mode."""
-        points = self.pass_maximum(y, amplitude, duration)
+    def sticks_again(self, steady: SteadySliding) -> bool:
+        """Return whether a motion that has stuck sticks again between its first two maxima.
+
+        The changes of mode are counted, so that short sticks are not missed.
+        """
+        points = self.turn_after_stick(steady)
         if points is None:
-            return nan, nan
-        found = self.locate_turn(*points)
-        return self.oscillator.measure(found.y - y), found.t
-
-    def sliding_amplitude(self, y: np.ndarray, duration: float) -> float:
-        """Return the largest amplitude about steady sliding y of a turn without a change of mode, to GRAZING."""
-        low, high = 0.0, self.size
-        for _ in range(64):
-            if self.pass_maximum(y, high, duration) is None:
+            return False
+        last = points[1]
+        for _ in range(MAX_TURNS * CHUNKS):
+            point = self.oscillator.step(last.t, steady.turn_time / CHUNKS)
+            if point.n_changes > last.n_changes:
+                return point.sticks or self.sticks_in_turn(last.y, steady.turn_time)
+            if self.is_maximum(last, point):
                 break
-            low, high = high, 2.0 * high
-        while high - low > GRAZING * high and high > 1e-12 * self.size:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if self.pass_maximum(y, middle, duration) is None else (middle, high)
-        self.size = 2.0 * high
-        return low
-
-    def sliding_orbits(self, y: np.ndarray, eigenvalues: np.ndarray) -> list[Orbit]:
-        """Return the orbits around steady sliding y that do not stick, of an oscillator with two coordinates."""
-        growth, duration, orbits = float(eigenvalues[0].real), turn_time(eigenvalues), list[Orbit]()
-        if len(eigenvalues) != 2 or not eigenvalues.imag.any():
-            return []
-        largest = self.sliding_amplitude(y, duration)
-
-        def gain(amplitude: float) -> float:
-            """Return the relative growth of an amplitude in a turn."""
-            if amplitude == 0.0:
-                return float(np.expm1(growth * duration))
-            return self.turn(y, amplitude, duration)[0] / amplitude - 1.0
-
-        amplitudes = [0.0, *(largest * np.geomspace(1e-2, 1.0, SCANNED)).tolist()] if largest else []
-        gains = [gain(amplitude) for amplitude in amplitudes]
-        for a, b, one, two in zip(amplitudes, amplitudes[1:], gains, gains[1:], strict=False):
-            if one * two < 0.0 and min(abs(one), abs(two)) > NEUTRAL:
-                amplitude = float(brentq(gain, a, b, xtol=1e-10 * largest, rtol=1e-9))
-                time = self.turn(y, amplitude, duration)[1]
-                orbits.append(self.shoot(y + amplitude * self.oscillator.gauge, time))
-        return orbits
+            last = point
+        return False
 
     def sticks_in_turn(self, y: np.ndarray, duration: float) -> bool:
-        """Return whether a motion from states y sticks before its second maximum, by each internal step of the FMU.
+        """Return whether a motion from states y sticks before its next maximum, by each internal step of the FMU.
 
         It may also pass to sliding in the other direction.
         """
-        last, maxima = None, 0
+        last = self.oscillator.begin(y)
         for point in self.oscillator.follow(y, MAX_TURNS * duration):
-            maxima += last is not None and self.is_maximum(last, point)
-            if point.sticks or maxima > 1:
+            if point.sticks or self.is_maximum(last, point):
                 return point.sticks
             last = point
         return False
 
-    def sticks_again(self, y: np.ndarray, duration: float) -> bool:
-        """Return whether a motion around steady sliding y that has stuck sticks again, before its second maximum.
+    def turn(self, steady: SteadySliding, amplitude: float) -> tuple[float, float]:
+        """Return the amplitude after a turn around steady sliding, and its time in s; NaN if the mode changes."""
+        last = self.oscillator.begin(steady.y + amplitude * self.oscillator.displacement)
+        for _ in range(4 * CHUNKS):
+            point = self.oscillator.step(last.t, steady.turn_time / CHUNKS)
+            if point.n_changes:
+                break
+            if last.t and self.is_maximum(last, point):
+                found = self.locate_turn(last, point)
+                return self.oscillator.measure(found.y - steady.y), found.t
+            last = point
+        return nan, nan
 
-        A turn takes about a duration in s. The changes of mode are counted, so that short sticks are not missed.
+    def sliding_orbits(self, steady: SteadySliding) -> tuple[list[Orbit], list[str]]:
+        """Return the orbits around steady sliding that do not stick, and remarks on those that are not returned.
+
+        A turn that sticks ends with the amplitude of all motions that have stuck. Between neighbouring amplitudes,
+        the growth in a turn changes its sign, or turns back before it does.
         """
-        for _ in range(64):
-            last = first = self.oscillator.begin(y + self.size * self.oscillator.gauge)
-            n_changes, maxima = 0, 0  # when it slides again after its first stick, and since then
-            for _ in range(1000 * CHUNKS):
-                point = self.oscillator.step(last.t, duration / CHUNKS)
-                maxima += self.is_maximum(last, point)
-                if not n_changes and any(a * b < 0 for a, b in zip(point.modes, first.modes, strict=True)):
-                    break  # it slides in the other direction: it began with too large an amplitude
-                if not n_changes and point.n_changes and point.modes == first.modes:
-                    n_changes, maxima = point.n_changes, int(self.is_maximum(last, point))
-                if n_changes and point.n_changes > n_changes:
-                    return point.sticks or self.sticks_in_turn(last.y, duration)
-                if n_changes and maxima > 1:
-                    return False
-                if not n_changes and maxima > 2:
-                    break
-                last = point
-            self.size *= 0.75 if point.n_changes else 2.0
-        return False
+        points, orbits, remarks = self.turn_after_stick(steady), list[Orbit](), list[str]()
+        if points is None or not steady.frequency:
+            return [], []
+        largest = self.oscillator.measure(self.locate_turn(*points).y - steady.y)
+
+        def gain(amplitude: float) -> float:
+            """Return the relative growth of an amplitude in a turn."""
+            if amplitude == 0.0:
+                return float(np.expm1(steady.growth * steady.turn_time))
+            after = self.turn(steady, amplitude)[0]
+            return (largest if after != after else after) / amplitude - 1.0
+
+        scanned = [0.0, *(largest * np.append(np.geomspace(1e-2, 1.0, SCANNED)[:-1], 1.0 - GRAZING)).tolist()]
+        gains = {amplitude: gain(amplitude) for amplitude in scanned}
+        for a, b, c in zip(scanned, scanned[1:], scanned[2:], strict=False):
+            sign = float(np.sign(gains[b]))
+            if 0.0 < sign * gains[b] < min(sign * gains[a], sign * gains[c]):
+                options = {"xatol": 1e-6 * largest}
+                found = minimize_scalar(lambda x, sign=sign: sign * gain(x), (a, c), bounds=(a, c), options=options)
+                gains[float(found.x)] = gain(float(found.x))
+        neutral = [amplitude for amplitude, growth in gains.items() if amplitude and abs(growth) <= NEUTRAL]
+        if len(neutral) > 1:
+            largest_neutral = f"orbits of all amplitudes up to at least {max(neutral):.4g}"
+            remarks.append(f"{largest_neutral} do not stick, and neither grow nor shrink: none of them is drawn.")
+        for a, b in pairwise(sorted(gains)):
+            if gains[a] * gains[b] < 0.0 and min(abs(gains[a]), abs(gains[b])) > NEUTRAL:
+                amplitude = find_root(gain, a, b, xtol=1e-10 * largest)
+                if abs(gain(amplitude)) > JUMP:
+                    continue  # from turns that do not stick to turns that do
+                try:
+                    time = self.turn(steady, amplitude)[1]
+                    orbits.append(self.shoot(steady.y + amplitude * self.oscillator.displacement, time))
+                except NoOrbitError as error:
+                    remarks.append(f"an orbit of the amplitude {amplitude:.4g} does not stick, but {error}.")
+        return orbits, remarks
 
 
-def turn_time(eigenvalues: np.ndarray) -> float:
-    """Return the time in s of a turn around steady sliding with these eigenvalues in 1/s."""
-    return 2.0 * pi / (float(np.abs(eigenvalues.imag).max()) or float(np.abs(eigenvalues).max()))
+def find_root(function: Callable[[float], float], a: float, b: float, **options: float) -> float:
+    """Return a value between a and b at which a function is zero.
+
+    Raises
+    ------
+    NoOrbitError
+        If its values at a and b have the same sign, or one is NaN.
+    """
+    try:
+        return float(brentq(function, a, b, rtol=ROOT_RTOL, **options))
+    except ValueError:
+        raise NoOrbitError(f"no change of sign was found between {a:.6g} and {b:.6g}") from None

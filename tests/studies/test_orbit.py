@@ -10,7 +10,7 @@ import pytest
 from build_cache import build_user_model
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 import harness
 
@@ -85,13 +85,14 @@ class Reversing(Model):
 '''
 
 
-def load_after_reversal(v_belt):
-    """Return by how much the spring exceeds the friction where the body, faster than the belt, has its speed again."""
+def spring(x):
+    """Return the force of the spring of Reversing."""
+    return 31.0 * x + 90.0 * x**3
 
-    def spring(x):
-        return 31.0 * x + 90.0 * x**3
 
-    x = brentq(lambda x: spring(x) - 0.6, 0.0, 1.0)  # where it leaves the belt
+def return_to_belt(v_belt, x):
+    """Return position and time of Reversing when it has twice had the speed of the belt since it left it at x."""
+    duration = 0.0
     for sign in (-1, 1):
 
         def rates(t, y, sign=sign):
@@ -102,8 +103,9 @@ def load_after_reversal(v_belt):
 
         has_speed_of_belt.terminal, has_speed_of_belt.direction = True, 1
         options = {"rtol": 1e-13, "atol": 1e-15, "max_step": 0.01, "events": has_speed_of_belt}
-        x = solve_ivp(rates, (0.0, 5.0), (x, v_belt), "DOP853", **options).y[0, -1]
-    return abs(spring(x)) - 0.6
+        run = solve_ivp(rates, (0.0, 5.0), (x, v_belt), "DOP853", **options)
+        x, duration = run.y[0, -1], duration + run.t[-1]
+    return x, duration
 
 
 @pytest.mark.slow
@@ -113,12 +115,97 @@ def test_a_reversal_of_the_slip_is_no_stick(tmp_path):
     folder = build_user_model(tmp_path / "reversing.py", "--native", "--platform", "linux64")
     result = harness.orbit(folder / "native" / "reversing.fmu", over={"v_b": [0.7, 0.95, 1.2]})
     (point,) = result.points
-    assert (point.kind, [item.value for item in result.motions if item.kind == STICK_SLIP]) == (
-        "stick-slip ends",
-        [0.7],
-    )
-    assert point.value == pytest.approx(brentq(load_after_reversal, 0.78, 0.9, xtol=1e-13), rel=5e-11)
-    assert [text.split(":")[0] for text in result.remarks] == ["v_b = 0.95", "v_b = 1.2"]
+    kinds = [(item.value, item.kind) for item in result.motions if item.kind != STEADY]
+    assert (point.kind, kinds) == ("stick-slip ends", [(0.7, STICK_SLIP), (0.95, SLIDING), (1.2, SLIDING)])
+    leaves = brentq(lambda x: spring(x) - 0.6, 0.0, 1.0)
+    exact = brentq(lambda v: abs(spring(return_to_belt(v, leaves)[0])) - 0.6, 0.78, 0.9, xtol=1e-13)
+    assert point.value == pytest.approx(exact, rel=5e-11)
+    x = brentq(lambda x: return_to_belt(0.95, x)[0] - x, leaves, 4 * leaves, xtol=1e-13)
+    orbit = next(item for item in result.motions if (item.value, item.kind) == (0.95, SLIDING))
+    assert orbit.period == pytest.approx(return_to_belt(0.95, x)[1], rel=1e-11)
+    assert orbit.stability == "stable"
+
+
+MEETING = '''
+from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State
+
+
+class Meeting(Model):
+    """Body on a belt with constant friction, and a damping that depends on its position."""
+
+    v_b = Parameter(1.5, "m/s", "speed of the belt")
+    x0 = Fixed(0.2, "m", "initial position")
+    v0 = Fixed(0.0, "m/s", "initial speed")
+    c0 = Parameter(-0.01, "N.s/m", "negative damping in the middle")
+    c2 = Parameter(0.1, "N.s/m3", "its increase")
+    c4 = Parameter(0.1, "N.s/m5", "its decrease")
+    m = Parameter(1.0, "kg", "mass")
+    k = Parameter(1.0, "N/m", "stiffness")
+    f = Parameter(0.1, "N", "friction")
+    x = State("m", "position", start=x0)
+    v = State("m/s", "speed", start=v0, rate_of=x)
+    mode = Mode()
+    F = Contact("N", "friction", mode=mode, slip=v - v_b, slide=f)
+    a = Output("m/s2", "acceleration", (-k * x + (c0 + c2 * x * x - c4 * x * x * x * x) * v - F) / m, rate_of=v)
+'''
+
+
+@cache
+def meeting(folder):
+    """Return the native FMU of Meeting."""
+    require_compiler()
+    (folder / "meeting.py").write_text(MEETING, encoding="utf-8")
+    return build_user_model(folder / "meeting.py", "--native", "--platform", "linux64") / "native" / "meeting.fmu"
+
+
+def growth_of_amplitude(c0, start, c2=0.1, c4=0.1):
+    """Return by how much a turning point of Meeting has moved outwards after a turn from x = 0.1 + start."""
+
+    def rates(t, y):
+        return y[1], 0.1 - y[0] + (c0 + c2 * y[0] ** 2 - c4 * y[0] ** 4) * y[1]
+
+    def turns(t, y):
+        return y[1]
+
+    turns.direction, turns.terminal = -1, 2  # the start counts
+    run = solve_ivp(rates, (0, 30), (0.1 + start, 0.0), "DOP853", rtol=1e-13, atol=1e-15, events=turns)
+    return run.y[0, -1] - 0.1 - start
+
+
+@pytest.mark.slow
+def test_two_orbits_meet_in_a_fold(tmp_path):
+    """Also where they lie between two of the amplitudes that are scanned."""
+    result = harness.orbit(meeting(tmp_path), over={"c0": [-0.02, -0.012, -0.01]})
+    (point,) = result.points
+    orbits = [(item.value, item.stability) for item in result.motions if item.kind == SLIDING]
+    assert orbits == [(value, stability) for value in (-0.012, -0.01) for stability in ("unstable", "stable")]
+    assert point.kind == "fold: two orbits meet"
+
+    def largest(c0):
+        options = {"xatol": 1e-8}
+        return minimize_scalar(lambda a: -growth_of_amplitude(c0, a), bounds=(0.8, 1.1), options=options).fun
+
+    assert point.value == pytest.approx(brentq(largest, -0.0125, -0.0115, xtol=1e-13), abs=1e-10)
+
+
+def test_an_orbit_is_found_where_large_amplitudes_are_overdamped(tmp_path):
+    """A motion that starts with a large amplitude does not turn there, and needs many steps."""
+    result = harness.orbit(meeting(tmp_path), {"v_b": 3.0, "c2": 1.0, "c4": 1.0})
+    assert not result.remarks
+    for orbit in result.motions[1:]:
+        amplitude = orbit.largest - 0.1
+        assert abs(growth_of_amplitude(-0.01, amplitude, 1.0, 1.0)) < 1e-9
+    assert [item.stability for item in result.motions] == ["stable", "unstable", "stable"]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "largest"), [("belt", {"law": "coulomb", "v_belt": 1.5}, 1.5), ("stickslip", {}, 0.0044)]
+)
+def test_orbits_of_all_amplitudes_are_named_and_not_drawn(name, values, largest):
+    """Without damping, all of them that do not reach the speed of the belt."""
+    result = harness.orbit(native(name), values)
+    assert [(item.kind, item.stability) for item in result.motions] == [(STEADY, "neutral"), (STICK_SLIP, "stable")]
+    assert 0.7 * largest < float(result.remarks[0].split("at least ")[1].split()[0]) < largest
 
 
 C, STATIC, DELTA = 0.1, 1.0, 3.0  # of the belt of Leine and others, with a damper
@@ -223,6 +310,19 @@ def test_a_motion_that_does_not_repeat_is_named_and_not_drawn():
 def test_arguments_are_refused_in_one_sentence(arguments, message):
     with pytest.raises(harness.SceneError, match=message):
         harness.orbit(native("belt"), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("servo", "no parameter sets v at the start"),
+        pytest.param("sleds", "no parameter sets v_1 at the start", marks=pytest.mark.slow),
+        pytest.param("clutch", "no force that depends on a position or a speed", marks=pytest.mark.slow),
+    ],
+)
+def test_models_without_starts_or_oscillations_are_refused(name, message):
+    with pytest.raises(harness.HarnessError, match=message):
+        harness.orbit(native(name))
 
 
 def test_the_command_saves_what_the_function_returns(tmp_path):

@@ -13,12 +13,12 @@ from ...errors import HarnessError
 from ...process.interrupt import check_interrupt
 from ...process.worker import WorkerPool
 from ...scenes.run_spec import RunSpec
+from ...simulation.edges import find_edges
 from ...simulation.native_equivalent import native_with_derivatives
-from ...simulation.oscillator import Oscillator
-from ...simulation.poincare import CYCLE, ReturnMap, turn_time
+from ...simulation.oscillator import Oscillator, open_oscillator
+from ...simulation.poincare import CYCLE, ReturnMap
 from .result import Edge, MapResult
 
-PRECISION = 1e-12  # relative, of the values at edges
 STEADY, STICK_SLIP, BOTH, NEITHER = "steady sliding", "stick-slip", "steady sliding or stick-slip", "neither"
 
 Line = tuple[np.ndarray, list[str], list[Edge], int]  # points (n, axes), labels, edges, and the number of runs
@@ -30,49 +30,33 @@ class LineSearch:
     def __init__(self, oscillator: Oscillator) -> None:
         self.oscillator, self.map = oscillator, ReturnMap(oscillator)
 
-    def label(self, point: Sequence[float]) -> str:
+    def label(self, point: np.ndarray) -> str:
         """Return what motions end in.
 
         Of one body that slides steadily, this is exact: by the eigenvalues of steady sliding, and by whether a motion
         that has stuck sticks again. Of any other model it is what the motion from its start ends in.
         """
-        self.oscillator.set_point(point)
-        found = self.oscillator.find_equilibrium()
-        if found is not None and len(found[1]) == 2:
-            is_stable = float(found[1].real.max()) < 0.0
-            sticks = self.map.sticks_again(found[0], turn_time(found[1]))
-            return {(1, 0): STEADY, (0, 1): STICK_SLIP, (1, 1): BOTH, (0, 0): NEITHER}[is_stable, sticks]
+        self.oscillator.set_point(point.tolist())
+        steady = self.oscillator.find_steady_sliding()
+        if steady is not None and self.oscillator.is_one_body:
+            sticks = self.map.sticks_again(steady)
+            return {(1, 0): STEADY, (0, 1): STICK_SLIP, (1, 1): BOTH, (0, 0): NEITHER}[steady.growth < 0.0, sticks]
         end = self.map.run_long(self.oscillator.start)
         return f"{end.n_sticks} sticks in a period" if end.kind == CYCLE else end.kind
 
     def search(self, points: np.ndarray) -> Line:
         """Label the points (n, axes) of a line, of which one coordinate varies, and bisect between different ones."""
         before, edges = self.oscillator.n_runs, list[Edge]()
-        labels = [self.label(point) for point in points.tolist()]
+        labels = [self.label(point) for point in points]
         for (one, two), (a, b) in zip(pairwise(labels), pairwise(points), strict=True):
-            edges += self.bisect(a, b, one, two)
+            for low, high, *names in find_edges(self.label, a, b, one, two):
+                edges.append(Edge(tuple((0.5 * (low + high)).tolist()), *names))
         return points, labels, edges, self.oscillator.n_runs - before
-
-    def bisect(self, a: np.ndarray, b: np.ndarray, one: str, two: str) -> list[Edge]:
-        """Return the edges between two points; several if a third label is between theirs."""
-        if one == two:
-            return []
-        while np.abs(b - a).max() > PRECISION * np.abs(b).max():
-            check_interrupt()
-            middle = 0.5 * (a + b)
-            label = self.label(middle.tolist())
-            if label == one:
-                a = middle
-            elif label == two:
-                b = middle
-            else:
-                return self.bisect(a, middle, one, label) + self.bisect(middle, b, label, two)
-        return [Edge(tuple((0.5 * (a + b)).tolist()), one, two)]
 
 
 def search_line(spec: RunSpec, names: tuple[str, ...], points: np.ndarray) -> Line:
     """Search a line in a worker process."""
-    with Oscillator(spec, names) as oscillator:
+    with open_oscillator(spec, names) as oscillator:
         return LineSearch(oscillator).search(points)
 
 
@@ -114,7 +98,7 @@ def compute_map(
     """
     names, run = tuple(axes), replace(spec, fmu=native_with_derivatives(spec.fmu))
     lines, grid, results = grid_lines([*axes.values()]), tuple(axes.values()), list[Line]()
-    with Oscillator(run, names) as oscillator:
+    with open_oscillator(run, names) as oscillator:
         units = {name: oscillator.units[name] for name in names}
         settings = {name: oscillator.default(name) for name in oscillator.parameters if name not in names}
         if workers is None:

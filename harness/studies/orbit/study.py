@@ -2,30 +2,28 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import nan, pi
+from math import nan
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from ...scenes.run_spec import RunSpec
+from ...simulation.edges import find_edges
 from ...simulation.native_equivalent import native_with_derivatives
-from ...simulation.oscillator import Oscillator
+from ...simulation.oscillator import Oscillator, SteadySliding, open_oscillator
 from ...simulation.poincare import (
-    CYCLE,
     IRREGULAR,
     MAX_PERIODS,
     MAX_RELEASES,
     REST,
-    SLIDING,
     NoOrbitError,
     Orbit,
     ReturnMap,
-    turn_time,
+    find_root,
 )
 from .motions import AT_REST, SLIDING_ORBIT, STEADY, STICK_SLIP, Motion, SpecialPoint
 from .result import OrbitResult
 
-PRECISION = 1e-13  # relative, of the values of special points
 PATH_POINTS = 400  # of an orbit in the phase plane
 NEAR = 1e-6  # relative difference of orbits that are the same
 
@@ -48,29 +46,27 @@ class BranchTracer:
         """Return the motions at a value of the parameter: steady sliding, and what motions from the seeds end in."""
         self.set_value(value)
         motions, orbits = list[Motion](), list[Orbit]()
-        equilibrium = self.oscillator.find_equilibrium()
-        if equilibrium is not None:
-            motions.append(self.describe_equilibrium(value, *equilibrium))
-            if len(equilibrium[1]) == 2:  # a motion that sticks forgets its start
-                sticks = self.map.sticks_again(equilibrium[0], turn_time(equilibrium[1]))
-                if sticks or motions[0].growth < 0.0:
-                    seeds = [equilibrium[0] + self.map.size * self.oscillator.gauge] if sticks else []
-                try:
-                    orbits += self.map.sliding_orbits(*equilibrium)
-                except NoOrbitError as error:
-                    self.remarks.append(f"{self.name_value(value)}: an orbit that does not stick is near, but {error}.")
+        steady = self.oscillator.find_steady_sliding()
+        if steady is not None:
+            motions.append(self.describe_steady_sliding(value, steady))
+        if steady is not None and self.oscillator.is_one_body:
+            orbits, remarks = self.map.sliding_orbits(steady)
+            self.remarks += [f"{self.name_value(value)}: {remark}" for remark in remarks]
+            stuck = self.map.turn_after_stick(steady) if self.map.sticks_again(steady) else None
+            if stuck is not None or steady.growth < 0.0:  # a motion that sticks forgets its start
+                seeds = [] if stuck is None else [stuck[1].y]
         for seed in seeds:
             end = self.map.run_long(seed)
             if end.kind == REST:
                 x = self.oscillator.measure(end.y)
                 motions.append(Motion(value, AT_REST, x, x, y=end.y))
-            elif end.kind == CYCLE:
+            elif end.kind == IRREGULAR:
+                self.remarks.append(f"{self.name_value(value)}: {describe_irregular(end.closest)}")
+            elif steady is None or self.map.distance(end.y, steady.y) > NEAR * self.map.distance(seed, steady.y):
                 try:
                     orbits.append(self.map.shoot(end.y, end.period))
                 except NoOrbitError as error:
-                    self.remarks.append(f"{self.name_value(value)}: {error}.")
-            else:
-                self.remarks.append(f"{self.name_value(value)}: {describe_irregular(end.kind, end.closest)}")
+                    self.remarks.append(f"{self.name_value(value)}: from the start, {error}.")
         for orbit in orbits:
             motion = self.describe_orbit(value, orbit)
             if not any(is_same(motion, other) for other in motions):
@@ -86,12 +82,11 @@ class BranchTracer:
         """Return the value with the name of the parameter."""
         return f"{self.oscillator.varied[0]} = {value:.6g}" if self.oscillator.varied else self.oscillator.spec.model
 
-    def describe_equilibrium(self, value: float, y: np.ndarray, eigenvalues: np.ndarray) -> Motion:
+    def describe_steady_sliding(self, value: float, steady: SteadySliding) -> Motion:
         """Return steady sliding; its period is that of small oscillations around it."""
-        x, frequency = self.oscillator.measure(y), float(np.abs(eigenvalues.imag).max())
-        growth = float(eigenvalues.real.max())
-        period = 2.0 * pi / frequency if frequency else nan
-        return Motion(value, STEADY, x, x, period, growth=growth, multipliers=np.exp(eigenvalues * period), y=y)
+        x, period = self.oscillator.measure(steady.y), steady.turn_time if steady.frequency else nan
+        multipliers = np.exp(steady.eigenvalues * period)
+        return Motion(value, STEADY, x, x, period, growth=steady.growth, multipliers=multipliers, y=steady.y)
 
     def describe_orbit(self, value: float, orbit: Orbit) -> Motion:
         """Return the motion of an orbit."""
@@ -125,69 +120,66 @@ class BranchTracer:
         """Return the special points between the motions at two neighbouring values."""
         low, high = one[0].value, two[0].value
         steady = [next((motion for motion in motions if motion.kind == STEADY), None) for motions in (one, two)]
-        sticking = [next((motion for motion in motions if motion.kind == STICK_SLIP), None) for motions in (one, two)]
+        sticks = [any(motion.kind == STICK_SLIP for motion in motions) for motions in (one, two)]
         sliding = [[motion for motion in motions if motion.kind == SLIDING_ORBIT] for motions in (one, two)]
         points = []
         if steady[0] and steady[1]:
             if (steady[0].growth < 0.0) != (steady[1].growth < 0.0):
                 points.append(self.locate_stability(low, high))
-            if (sticking[0] is None) != (sticking[1] is None) and len(steady[0].multipliers) == 2:
-                points.append(self.locate_grazing(low, high, sticking[0] is not None))
+            if sticks[0] != sticks[1] and self.oscillator.is_one_body:
+                points.append(self.locate_grazing(low, high, sticks[0]))
             if not points and abs(len(sliding[0]) - len(sliding[1])) == 2:
-                points.append(self.locate_fold(low, high, sliding))
+                points.append(self.locate_fold(low, high, *sliding))
         elif len(one) == len(two) == 1 and not (steady[0] or steady[1]):
             a, b = one[0], two[0]
             if a.n_sticks != b.n_sticks or a.kind != b.kind:
                 points.append(self.locate_sticks(a, b))
-            if a.growth * b.growth < 0.0:
-                points.append(self.locate_multiplier(a, b))
         return points
+
+    def steady_sliding(self, value: float) -> SteadySliding:
+        """Return steady sliding at a value.
+
+        Raises
+        ------
+        NoOrbitError
+            If there is none.
+        """
+        self.set_value(value)
+        steady = self.oscillator.find_steady_sliding()
+        if steady is None:
+            raise NoOrbitError(f"there is no steady sliding at {self.name_value(value)}")
+        return steady
 
     def locate_stability(self, low: float, high: float) -> SpecialPoint:
         """Return the value at which an eigenvalue of steady sliding has no real part."""
-
-        def growth(value: float) -> float:
-            self.set_value(value)
-            found = self.oscillator.find_equilibrium()
-            return nan if found is None else float(found[1].real.max())
-
-        value = float(brentq(growth, low, high, xtol=PRECISION * abs(high), rtol=PRECISION))
-        change = "stable" if growth(low) > growth(high) else "unstable"
-        self.set_value(value)
-        y = self.oscillator.find_equilibrium()
-        x = nan if y is None else self.oscillator.measure(y[0])
+        value = find_root(lambda value: self.steady_sliding(value).growth, low, high)
+        change = "stable" if self.steady_sliding(low).growth > self.steady_sliding(high).growth else "unstable"
+        x = self.oscillator.measure(self.steady_sliding(value).y)
         return SpecialPoint(value, f"steady sliding turns {change}", x, "zero of the real part of its eigenvalue")
 
     def locate_grazing(self, low: float, high: float, sticks_below: bool) -> SpecialPoint:
         """Return the value at which stick-slip begins or ends, by whether a motion that has stuck sticks again."""
-
-        def sticks(value: float) -> bool:
-            self.set_value(value)
-            found = self.oscillator.find_equilibrium()
-            return found is not None and self.map.sticks_again(found[0], turn_time(found[1]))
-
-        last, first = bisect(lambda value: sticks(value) == sticks_below, low, high)
+        ((last, first, *_),) = find_edges(
+            lambda value: self.map.sticks_again(self.steady_sliding(value)), low, high, sticks_below, not sticks_below
+        )
         edge = last if sticks_below else first
         motions = [motion for motion in self.find_motions(edge, []) if motion.kind == STICK_SLIP]
         x = motions[0].largest if motions else nan
         kind = "stick-slip ends" if sticks_below else "stick-slip begins"
         return SpecialPoint(edge, kind, x, "bisection on whether it sticks again")
 
-    def locate_fold(self, low: float, high: float, sliding: list[list[Motion]]) -> SpecialPoint:
+    def locate_fold(self, low: float, high: float, below: list[Motion], above: list[Motion]) -> SpecialPoint:
         """Return the value at which two orbits that do not stick meet: the extreme one along their branch."""
-        is_below = len(sliding[0]) > len(sliding[1])
-        pair = sorted(sliding[0] if is_below else sliding[1], key=lambda motion: motion.largest)[-2:]
-
-        def gain(value: float, amplitude: float) -> float:
-            self.set_value(value)
-            y, eigenvalues = self.oscillator.find_equilibrium()  # type: ignore[misc]
-            return self.map.turn(y, amplitude, turn_time(eigenvalues))[0] / amplitude - 1.0
+        is_below = len(below) > len(above)
+        pair = (below if is_below else above)[-2:]
 
         def value_of(amplitude: float) -> float:
-            return float(brentq(gain, low, high, args=(amplitude,), xtol=1e-14, rtol=PRECISION))
+            """Return the value at which a turn ends with the amplitude of its begin."""
+            return find_root(
+                lambda value: self.map.turn(self.steady_sliding(value), amplitude)[0] / amplitude - 1.0, low, high
+            )
 
-        self.set_value(pair[0].value)
-        x = self.oscillator.measure(self.oscillator.find_equilibrium()[0])  # type: ignore[index]
+        x = self.oscillator.measure(self.steady_sliding(pair[0].value).y)
         sign, ends = (-1.0 if is_below else 1.0), [motion.largest - x for motion in pair]
         best = minimize_scalar(lambda a: sign * value_of(a), bounds=ends, method="bounded", options={"xatol": 1e-8})
         value = value_of(best.x)
@@ -204,35 +196,11 @@ class BranchTracer:
                 return True
             return False
 
-        edge, _ = bisect(is_same_kind, a.value, b.value)
+        ((edge, *_),) = find_edges(is_same_kind, a.value, b.value, True, False)
         names = [
             motion.kind if motion.kind == AT_REST else f"{motion.n_sticks} sticks in a period" for motion in (a, b)
         ]
         return SpecialPoint(edge, " become ".join(names), seed[0].largest, "bisection on the number of sticks")
-
-    def locate_multiplier(self, a: Motion, b: Motion) -> SpecialPoint:
-        """Return the value at which the largest multiplier of an orbit has modulus 1."""
-        seed = [a]
-
-        def growth(value: float) -> float:
-            self.set_value(value)
-            orbit = self.map.shoot(seed[0].y, seed[0].period)
-            seed[0] = self.describe_orbit(value, orbit)
-            return seed[0].growth
-
-        value = float(brentq(growth, a.value, b.value, xtol=PRECISION * abs(b.value), rtol=PRECISION))
-        growth(value)
-        return SpecialPoint(value, "orbit changes its stability", seed[0].largest, "multiplier of modulus 1")
-
-
-def bisect(holds: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
-    """Return neighbouring values of which the first holds as `low` does, and the second as `high` does."""
-    while high - low > PRECISION * max(abs(low), abs(high)):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low, high
 
 
 def is_same(one: Motion, two: Motion) -> bool:
@@ -242,15 +210,12 @@ def is_same(one: Motion, two: Motion) -> bool:
     return one.kind == two.kind and near and (one.kind == AT_REST or abs(one.period - two.period) <= NEAR * one.period)
 
 
-def describe_irregular(kind: str, closest: float) -> str:
+def describe_irregular(closest: float) -> str:
     """Return a sentence on a motion that is neither at rest nor periodic."""
-    if kind == IRREGULAR:
-        return (
-            f"the motion from the start has not repeated in {MAX_RELEASES} slips, or {MAX_PERIODS} periods of the "
-            f"force; the closest states differ by {closest:.1e}: it is quasi-periodic, chaotic, or slow to settle."
-        )
-    assert kind == SLIDING
-    return "the motion from the start turns without sticking, and settles nowhere that Newton's method finds."
+    return (
+        f"the motion from the start has not repeated in {MAX_RELEASES} slips, or {MAX_PERIODS} periods of the "
+        f"force; the closest states differ by {closest:.1e}: it is quasi-periodic, chaotic, or slow to settle."
+    )
 
 
 def compute_orbits(
@@ -280,13 +245,16 @@ def compute_orbits(
         If the FMU is not suitable.
     """
     run = replace(spec, fmu=native_with_derivatives(spec.fmu))
-    with Oscillator(run, (parameter,) if parameter else ()) as oscillator:
+    with open_oscillator(run, (parameter,) if parameter else ()) as oscillator:
         tracer, motions, points = BranchTracer(oscillator), list[list[Motion]](), list[SpecialPoint]()
         for number, value in enumerate(values or (nan,)):
             seeds = [motion.y for motion in (motions[-1] if motions else ()) if motion.kind != STEADY]
             motions.append(tracer.find_motions(value, [*seeds, oscillator.start]))
             if number and motions[-1] and motions[-2]:
-                points += tracer.locate(motions[-2], motions[-1])
+                try:
+                    points += tracer.locate(motions[-2], motions[-1])
+                except NoOrbitError as error:
+                    tracer.remarks.append(f"a special point below {tracer.name_value(value)} is not located: {error}.")
             report((number + 1) / max(1, len(values)))
         every = tuple(motion for found in motions for motion in found)
         coordinate = oscillator.states[oscillator.coordinate]

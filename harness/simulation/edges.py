@@ -1,0 +1,35 @@
+"""Bisection on labels: values between which what motions end in changes."""
+
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..process.interrupt import check_interrupt
+
+PRECISION, MAX_HALVES = 1e-13, 200  # relative, of the values at edges
+Label = TypeVar("Label", bound=Hashable)
+
+
+def find_edges(
+    label: Callable[[Any], Label], a: Any, b: Any, one: Label, two: Label
+) -> list[tuple[Any, Any, Label, Label]]:
+    """Return the edges between numbers or points a and b with labels one and two, as neighbours with their labels.
+
+    Where a third label is between theirs, there are several edges.
+    """
+    if one == two:
+        return []
+    for _ in range(MAX_HALVES):
+        if np.abs(b - a).max() <= PRECISION * np.abs(b).max():
+            break
+        check_interrupt()
+        middle = 0.5 * (a + b)
+        found = label(middle)
+        if found == one:
+            a = middle
+        elif found == two:
+            b = middle
+        else:
+            return find_edges(label, a, middle, one, found) + find_edges(label, middle, b, found, two)
+    return [(a, b, one, two)]
