@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from .analyses.motion import MotionMeasures
     from .records.record import Record
     from .simulation.fmu_variables import FmuDescription
+    from .simulation.motion import Motion
     from .simulation.signals import ModeChanges, Signals
     from .simulation.trajectory import Trajectory
     from .studies.compare.result import ComparisonResult
@@ -60,8 +61,7 @@ if TYPE_CHECKING:
     from .studies.decay.result import DecayResult
     from .studies.fit.result import FitResult
     from .studies.motion_map.result import Edge, MapResult
-    from .studies.orbit.motions import Motion, SpecialPoint
-    from .studies.orbit.result import OrbitResult
+    from .studies.orbit.result import OrbitResult, SpecialPoint
     from .studies.precision.result import PrecisionResult
     from .studies.run.result import RunResult
     from .studies.sensitivity.result import SensitivityEvent, SensitivityResult
@@ -129,9 +129,9 @@ TYPES = {
     "MotionMeasures": "harness.analyses.motion",
     "Edge": "harness.studies.motion_map.result",
     "MapResult": "harness.studies.motion_map.result",
-    "Motion": "harness.studies.orbit.motions",
+    "Motion": "harness.simulation.motion",
     "OrbitResult": "harness.studies.orbit.result",
-    "SpecialPoint": "harness.studies.orbit.motions",
+    "SpecialPoint": "harness.studies.orbit.result",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
     "PrecisionResult": "harness.studies.precision.result",
     "Record": "harness.records.record",

@@ -201,30 +201,34 @@ class Oscillator:
         y = reals[self.positions[0]] + self.shift
         return Point(t, y, reals[self.positions[1]], tuple(map(int, modes)), n_changes)
 
-    def step(self, t: float, h: float) -> Point:
-        """Go on from a time by h, in s."""
+    def step(self, t: float, end: float) -> Point:
+        """Go on from a time to another one, in s."""
         self.n_runs += t == 0.0
         try:
-            self.instance.step(t, h)
+            self.instance.step(t, end - t)
         except CALL_FAILURES as error:
             raise self.failure(error) from None
-        return self.read(t + h)
+        return self.read(end)
 
     def failure(self, error: Exception) -> HarnessError:
         """Return the error of a run that failed, with the message of the FMU."""
         return HarnessError(self.instance.log.error_message or f"{self.spec.fmu.name}: {error}")
 
-    def follow(self, y: np.ndarray, stop: float = STOP) -> Iterator[Point]:
-        """Yield the ends of internal steps from states y until a time in s; a change of mode ends a step."""
-        point = self.begin(y)
+    def follow(self, y: np.ndarray, stop: float = STOP, every: float = inf) -> Iterator[Point]:
+        """Yield the ends of internal steps from states y until a time in s; a change of mode ends a step.
+
+        With `every`, the multiples of this time are among them.
+        """
+        point, n = self.begin(y), 1
         yield point
         for number in range(MAX_STEPS):
             if number % 1000 == 0:
                 check_interrupt()
             if point.t >= stop:
                 return
-            end = min(max(self.t_next, float(np.nextafter(point.t, inf))), stop)
-            point = self.step(point.t, end - point.t)
+            n += point.t == n * every
+            end = min(max(self.t_next, float(np.nextafter(point.t, inf))), stop, n * every)
+            point = self.step(point.t, end)
             yield point
         raise HarnessError(f"the motion needs more than {MAX_STEPS} steps until t = {point.t:.6g} s")
 

@@ -12,22 +12,23 @@ R. I. Leine, D. H. van Campen, B. L. van de Vrande, Bifurcations in nonlinear di
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
 from itertools import pairwise
 from math import inf, nan
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from ..errors import HarnessError
+from .motion import NEUTRAL, SLIDING_ORBIT, STICK_SLIP, Motion
 from .oscillator import MAX_ITERATIONS, Oscillator, Point, SteadySliding
 
-NEUTRAL = 1e-9  # growth of an amplitude in a turn that is none
 REPEATS = 1e-9  # relative difference of states that repeat
 COLLAPSED = 1e-4  # share of the first rates at which an orbit has shrunk to steady sliding
 CLOSED = 1e-8  # the same of the ends of an orbit
-MAX_RELEASES, MAX_TURNS, MAX_PERIODS = 64, 64, 256  # until a motion has repeated
-NEWTON_PERIODS = (16, 64, MAX_PERIODS)  # of a force, after which Newton's method is tried
+MAX_TURNS = 64  # without sticking
+RETURNS = (16, 48, 192)  # until a motion has repeated; after each, Newton's method is tried
 MAX_MULTIPLE = 8  # slips, or periods of the force, of the longest period
 CHUNKS = 12  # communication steps in a turn
 GRAZING = 1e-7  # relative distance from the largest amplitude of orbits that do not stick
@@ -35,55 +36,14 @@ BESIDE = 1e-6  # relative difference of the speed of a body that sticks at once
 JUMP = 1e-5  # growth of an amplitude at its zero that is a jump
 ROOT_RTOL = 1e-13  # relative accuracy of zeros
 SCANNED = 16  # amplitudes between which orbits that do not stick are sought
-REST, SLIDING, CYCLE, IRREGULAR = "rest", "sliding", "cycle", "irregular"
+REST, TURNING, CYCLE, IRREGULAR = "rest", "sliding", "cycle", "irregular"
 
 
-@dataclass(frozen=True)
-class Orbit:
-    """A periodic motion.
+class Ending(NamedTuple):
+    """What a motion ends in, as seen after a long time.
 
-    Attributes
-    ----------
-    y : numpy.ndarray
-        States (n,) of a point where it slides.
-    period : float
-        Period in s.
-    largest, smallest : float
-        Extreme values of the state that measures the motion.
-    stick_time : float
-        Time of a period in s in which a contact sticks.
-    n_sticks : int
-        Number of sticks in a period.
-    multipliers : numpy.ndarray
-        Floquet multipliers; NaN where no derivative exists.
-    error : float
-        Largest change of the coordinates after a period, relative to their size.
-    """
-
-    y: np.ndarray
-    period: float
-    largest: float
-    smallest: float
-    stick_time: float
-    n_sticks: int
-    multipliers: np.ndarray
-    error: float
-
-
-@dataclass(frozen=True)
-class LongMotion:
-    """What a motion ends in.
-
-    Attributes
-    ----------
-    kind : str
-        REST, SLIDING (without sticking), CYCLE or IRREGULAR.
-    y, period : numpy.ndarray, float
-        Guess of the orbit: states (n,) where it slides, and period in s, NaN at rest.
-    n_sticks : int
-        Number of sticks in this period.
-    closest : float
-        Smallest relative difference of states after up to MAX_MULTIPLE slips or periods of the force.
+    Its kind is REST, TURNING (without sticking), CYCLE or IRREGULAR. Of a cycle and of turning, states (n,) where it
+    slides and its period in s are a guess of an orbit; `closest` is the smallest relative difference of returns.
     """
 
     kind: str
@@ -116,61 +76,51 @@ class ReturnMap:
 
     # ---- what a motion ends in
 
-    def run_long(self, y: np.ndarray) -> LongMotion:
-        """Return what the motion from states y ends in."""
-        return self.run_free(y) if self.oscillator.phase is None else self.run_forced(y)
+    def run_long(self, y: np.ndarray) -> Ending:
+        """Return what the motion from states y ends in; what settles slowly is found by Newton's method."""
+        end = Ending(IRREGULAR, y)
+        for count in RETURNS:
+            end = self.follow_returns(end.y, count)
+            if end.kind != IRREGULAR:
+                break
+            with suppress(NoOrbitError):
+                if self.shoot(end.y, end.period).multiplier < 1.0 - NEUTRAL**0.5:
+                    return end._replace(kind=CYCLE)
+        return end
 
-    def run_free(self, y: np.ndarray) -> LongMotion:
-        """Follow a motion until the states at the ends of two sticks are the same, or it turns without sticking."""
-        path, releases, maxima, closest = list[Point](), list[Point](), list[tuple[Point, Point]](), inf
-        for new in self.oscillator.follow(y):
+    def follow_returns(self, y: np.ndarray, count: int) -> Ending:
+        """Follow the motion from states y until its returns repeat, or it turns without sticking.
+
+        It returns at the ends of sticks; under a force, after each period.
+        """
+        oscillator, period = self.oscillator, self.oscillator.forced_period
+        path, returns, maxima = list[Point](), list[Point](), list[tuple[Point, Point]]()
+        scale, closest = 1e-300, inf
+        for new in oscillator.follow(y, every=period or inf):
             last = path[-1] if path else new
             path.append(new)
+            scale = max(scale, float(np.abs(oscillator.reduce(new.y)).max()))
             if self.is_maximum(last, new):
                 maxima.append((last, new))
             if last.sticks and not new.sticks:
                 maxima.clear()
-                scale = max(float(np.abs(self.oscillator.reduce(item.y)).max()) for item in path)
-                for old in releases[: -MAX_MULTIPLE - 1 : -1]:
-                    if old.modes == new.modes:
-                        closest = min(closest, self.distance(old.y, new.y) / scale)
-                        if closest <= REPEATS:
-                            return self.describe_cycle([item for item in path if item.t >= old.t], new.t - old.t)
-                releases.append(new)
-            if new.modes and not any(new.modes) and not self.oscillator.reduce(new.f).any():
-                return LongMotion(REST, new.y)
-            if len(maxima) > MAX_TURNS:
-                before, maximum = (self.locate_turn(*pair) for pair in maxima[-2:])
-                return LongMotion(SLIDING, maximum.y, maximum.t - before.t)
-            if len(releases) > MAX_RELEASES:
+            if new.t == len(returns) * period if period else last.sticks and not new.sticks:
+                for old in returns[: -MAX_MULTIPLE - 1 : -1]:
+                    closest = min(closest, self.distance(old.y, new.y) / scale if old.modes == new.modes else inf)
+                    if closest <= REPEATS:
+                        return self.describe_cycle([item for item in path if item.t >= old.t])
+                returns.append(new)
+                if len(returns) > count:
+                    end = self.describe_cycle([item for item in path if item.t >= returns[-2].t])
+                    return end._replace(kind=IRREGULAR, closest=closest)
+            if not period and new.modes and not any(new.modes) and not oscillator.reduce(new.f).any():
                 break
-        return LongMotion(IRREGULAR, path[-1].y, closest=closest)
+            if not period and len(maxima) > MAX_TURNS:
+                before, maximum = (self.locate_turn(*pair) for pair in maxima[-2:])
+                return Ending(TURNING, maximum.y, maximum.t - before.t)
+        return Ending(REST, path[-1].y)
 
-    def run_forced(self, y: np.ndarray) -> LongMotion:
-        """Follow a motion until the states after periods of the force are the same."""
-        period, starts, closest = self.oscillator.forced_period, [y], inf
-        assert period is not None
-        for number in range(1, MAX_PERIODS + 1):
-            path = [*self.oscillator.follow(starts[-1], period)]
-            new = path[-1].y
-            new[self.oscillator.phase] = y[self.oscillator.phase]
-            scale = max(float(np.abs(self.oscillator.reduce(item.y)).max()) for item in path) or 1.0
-            for k, old in enumerate(starts[: -MAX_MULTIPLE - 1 : -1], 1):
-                closest = min(closest, self.distance(old, new) / scale)
-                if closest <= REPEATS:
-                    return self.describe_cycle([*self.oscillator.follow(new, k * period)], k * period)
-            starts.append(new)
-            if number in NEWTON_PERIODS:
-                motion = self.describe_cycle([*self.oscillator.follow(new, period)], period)
-                try:
-                    orbit = self.shoot(motion.y, period)
-                except NoOrbitError:
-                    continue
-                if np.abs(orbit.multipliers).max() < 1.0 - NEUTRAL**0.5:
-                    return motion
-        return LongMotion(IRREGULAR, starts[-1], closest=closest)
-
-    def describe_cycle(self, path: list[Point], period: float) -> LongMotion:
+    def describe_cycle(self, path: list[Point]) -> Ending:
         """Return the cycle that a motion has gone through, with the middle of its longest slip."""
         slips, n_sticks = list[list[Point]](), 0
         for last, point in zip([path[0], *path], path, strict=False):
@@ -180,10 +130,10 @@ class ReturnMap:
                 slips[-1].append(point)
             n_sticks += point.sticks and not last.sticks
         if not slips:
-            return LongMotion(REST, path[-1].y)
+            return Ending(REST, path[-1].y)
         longest = max(slips, key=lambda slip: slip[-1].t - slip[0].t)
         middle = min(longest, key=lambda point: abs(2.0 * point.t - longest[0].t - longest[-1].t))
-        return LongMotion(CYCLE, middle.y, period, n_sticks)
+        return Ending(CYCLE, middle.y, path[-1].t - path[0].t, n_sticks)
 
     def distance(self, one: np.ndarray, two: np.ndarray) -> float:
         """Return the largest difference of the coordinates of two states."""
@@ -195,7 +145,7 @@ class ReturnMap:
 
     # ---- orbits
 
-    def shoot(self, y: np.ndarray, period: float) -> Orbit:
+    def shoot(self, y: np.ndarray, period: float) -> Motion:
         """Return the orbit near states y and a period in s, by Newton's method.
 
         Raises
@@ -239,7 +189,7 @@ class ReturnMap:
             values = np.delete(values, np.argmin(np.abs(values - 1.0)))
         return values[np.argsort(-np.abs(values))]
 
-    def measure_orbit(self, y: np.ndarray, period: float, multipliers: np.ndarray) -> Orbit:
+    def measure_orbit(self, y: np.ndarray, period: float, multipliers: np.ndarray) -> Motion:
         """Run one period, and measure it.
 
         Raises
@@ -260,7 +210,19 @@ class ReturnMap:
             n_sticks += point.sticks and not last.sticks
             if not last.sticks and oscillator.measure(last.f) * oscillator.measure(point.f) < 0.0:
                 extremes.append(oscillator.measure(self.locate_turn(last, point).y))
-        return Orbit(y, period, max(extremes), min(extremes), stick_time, n_sticks, multipliers, error)
+        growth = float(np.log(max(float(np.abs(multipliers).max()), 1e-300))) / period
+        return Motion(
+            STICK_SLIP if n_sticks else SLIDING_ORBIT,
+            y,
+            max(extremes),
+            min(extremes),
+            period,
+            stick_time,
+            n_sticks,
+            growth,
+            multipliers,
+            error,
+        )
 
     def locate_turn(self, last: Point, point: Point) -> Point:
         """Return the point between two points, at which the state that measures the motion turns."""
@@ -342,7 +304,7 @@ class ReturnMap:
             return False
         last = points[1]
         for _ in range(MAX_TURNS * CHUNKS):
-            point = self.oscillator.step(last.t, steady.turn_time / CHUNKS)
+            point = self.oscillator.step(last.t, last.t + steady.turn_time / CHUNKS)
             if point.n_changes > last.n_changes:
                 return point.sticks or self.sticks_in_turn(last.y, steady.turn_time)
             if self.is_maximum(last, point):
@@ -366,7 +328,7 @@ class ReturnMap:
         """Return the amplitude after a turn around steady sliding, and its time in s; NaN if the mode changes."""
         last = self.oscillator.begin(steady.y + amplitude * self.oscillator.displacement)
         for _ in range(4 * CHUNKS):
-            point = self.oscillator.step(last.t, steady.turn_time / CHUNKS)
+            point = self.oscillator.step(last.t, last.t + steady.turn_time / CHUNKS)
             if point.n_changes:
                 break
             if last.t and self.is_maximum(last, point):
@@ -375,13 +337,13 @@ class ReturnMap:
             last = point
         return nan, nan
 
-    def sliding_orbits(self, steady: SteadySliding) -> tuple[list[Orbit], list[str]]:
+    def sliding_orbits(self, steady: SteadySliding) -> tuple[list[Motion], list[str]]:
         """Return the orbits around steady sliding that do not stick, and remarks on those that are not returned.
 
         A turn that sticks ends with the amplitude of all motions that have stuck. Between neighbouring amplitudes,
         the growth in a turn changes its sign, or turns back before it does.
         """
-        points, orbits, remarks = self.turn_after_stick(steady), list[Orbit](), list[str]()
+        points, orbits, remarks = self.turn_after_stick(steady), list[Motion](), list[str]()
         if points is None or not steady.frequency:
             return [], []
         largest = self.oscillator.measure(self.locate_turn(*points).y - steady.y)

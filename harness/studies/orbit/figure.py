@@ -4,7 +4,7 @@ from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, LEGEND_ABOVE, ORANGE, WIDTH, Axes, Figure, axis_label, set_size
-from .motions import AT_REST, SLIDING_ORBIT, STEADY, STICK_SLIP, Motion
+from ...simulation.motion import AT_REST, SLIDING_ORBIT, STEADY, STICK_SLIP, Motion
 
 if TYPE_CHECKING:
     from .result import OrbitResult

@@ -11,11 +11,33 @@ from ...results.provenance import describe_sources
 from ...results.result import Result
 from ...results.summary import ResultColumn, ResultTable
 from ...scenes.run_spec import RunSpec
-from .motions import Motion, SpecialPoint
+from ...simulation.motion import Motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class SpecialPoint:
+    """A value of the parameter at which motions begin, end or change.
+
+    Attributes
+    ----------
+    value : float
+        Value of the parameter.
+    kind : str
+        What happens as the parameter increases.
+    largest : float
+        Largest value of the coordinate there.
+    how : str
+        How the value was found.
+    """
+
+    value: float
+    kind: str
+    largest: float
+    how: str
 
 
 @dataclass(frozen=True, repr=False)
@@ -76,8 +98,18 @@ class OrbitResult(Result):
         points = ResultTable(self.points, self._point_columns(), "Special points")
         return (points,) if self.parameter and self.points else (self._data_table(), points)
 
+    def _rows(self) -> list[dict[str, Any]]:
+        """Return the numbers of each motion by name, as files and pandas have them."""
+        names = ("stability", "period", "amplitude", "largest", "smallest", "stick_time", "slip_time")
+        return [
+            {self.parameter or "model": motion.value, "motion": motion.kind}
+            | {name: getattr(motion, name) for name in names}
+            | {"sticks": motion.n_sticks, "multiplier": motion.multiplier, "growth": motion.growth}
+            for motion in self.motions
+        ]
+
     def _data_table(self) -> ResultTable:
-        return ResultTable([motion.as_row(self.parameter) for motion in self.motions], self._motion_columns())
+        return ResultTable(self._rows(), self._motion_columns())
 
     def _motion_columns(self) -> tuple[ResultColumn, ...]:
         value = ResultColumn(f"{self.parameter} [{self.unit}]", f"{{0[{self.parameter}]:.6g}}")
@@ -104,12 +136,13 @@ class OrbitResult(Result):
         return [*self.remarks, f"{self.n_runs} runs of the FMU."]
 
     def as_json(self) -> dict[str, Any]:
-        rows = [motion.as_row(self.parameter) for motion in self.motions]
         return {
             "model": self.spec.model,
             "parameter": self.parameter,
             "coordinate": self.coordinate,
-            "motions": [{name: None if value != value else value for name, value in row.items()} for row in rows],
+            "motions": [
+                {name: None if value != value else value for name, value in row.items()} for row in self._rows()
+            ],
             "points": [vars(point) for point in self.points],
             "remarks": list(self.remarks),
         }

@@ -9,20 +9,18 @@ from scipy.optimize import minimize_scalar
 
 from ...scenes.run_spec import RunSpec
 from ...simulation.edges import find_edges
+from ...simulation.motion import AT_REST, SLIDING_ORBIT, STEADY, STICK_SLIP, Motion
 from ...simulation.native_equivalent import native_with_derivatives
 from ...simulation.oscillator import Oscillator, SteadySliding, open_oscillator
 from ...simulation.poincare import (
     IRREGULAR,
-    MAX_PERIODS,
-    MAX_RELEASES,
     REST,
+    RETURNS,
     NoOrbitError,
-    Orbit,
     ReturnMap,
     find_root,
 )
-from .motions import AT_REST, SLIDING_ORBIT, STEADY, STICK_SLIP, Motion, SpecialPoint
-from .result import OrbitResult
+from .result import OrbitResult, SpecialPoint
 
 PATH_POINTS = 400  # of an orbit in the phase plane
 NEAR = 1e-6  # relative difference of orbits that are the same
@@ -45,13 +43,12 @@ class BranchTracer:
     def find_motions(self, value: float, seeds: Sequence[np.ndarray]) -> list[Motion]:
         """Return the motions at a value of the parameter: steady sliding, and what motions from the seeds end in."""
         self.set_value(value)
-        motions, orbits = list[Motion](), list[Orbit]()
+        motions, orbits, remarks = list[Motion](), list[Motion](), list[str]()
         steady = self.oscillator.find_steady_sliding()
         if steady is not None:
-            motions.append(self.describe_steady_sliding(value, steady))
+            motions.append(self.describe_steady_sliding(steady))
         if steady is not None and self.oscillator.is_one_body:
             orbits, remarks = self.map.sliding_orbits(steady)
-            self.remarks += [f"{self.name_value(value)}: {remark}" for remark in remarks]
             stuck = self.map.turn_after_stick(steady) if self.map.sticks_again(steady) else None
             if stuck is not None or steady.growth < 0.0:  # a motion that sticks forgets its start
                 seeds = [] if stuck is None else [stuck[1].y]
@@ -59,19 +56,19 @@ class BranchTracer:
             end = self.map.run_long(seed)
             if end.kind == REST:
                 x = self.oscillator.measure(end.y)
-                motions.append(Motion(value, AT_REST, x, x, y=end.y))
+                motions.append(Motion(AT_REST, end.y, x, x))
             elif end.kind == IRREGULAR:
-                self.remarks.append(f"{self.name_value(value)}: {describe_irregular(end.closest)}")
+                remarks.append(describe_irregular(end.closest))
             elif steady is None or self.map.distance(end.y, steady.y) > NEAR * self.map.distance(seed, steady.y):
                 try:
                     orbits.append(self.map.shoot(end.y, end.period))
                 except NoOrbitError as error:
-                    self.remarks.append(f"{self.name_value(value)}: from the start, {error}.")
+                    remarks.append(f"from the start, {error}.")
         for orbit in orbits:
-            motion = self.describe_orbit(value, orbit)
-            if not any(is_same(motion, other) for other in motions):
-                motions.append(motion)
-        return sorted(motions, key=lambda motion: motion.largest - motion.smallest)
+            if not any(is_same(orbit, other) for other in motions):
+                motions.append(orbit)
+        self.remarks += [f"{self.name_value(value)}: {remark}" for remark in remarks]
+        return [replace(motion, value=value) for motion in sorted(motions, key=lambda motion: motion.amplitude)]
 
     def set_value(self, value: float) -> None:
         """Set the varied parameter, if there is one."""
@@ -82,28 +79,11 @@ class BranchTracer:
         """Return the value with the name of the parameter."""
         return f"{self.oscillator.varied[0]} = {value:.6g}" if self.oscillator.varied else self.oscillator.spec.model
 
-    def describe_steady_sliding(self, value: float, steady: SteadySliding) -> Motion:
+    def describe_steady_sliding(self, steady: SteadySliding) -> Motion:
         """Return steady sliding; its period is that of small oscillations around it."""
         x, period = self.oscillator.measure(steady.y), steady.turn_time if steady.frequency else nan
         multipliers = np.exp(steady.eigenvalues * period)
-        return Motion(value, STEADY, x, x, period, growth=steady.growth, multipliers=multipliers, y=steady.y)
-
-    def describe_orbit(self, value: float, orbit: Orbit) -> Motion:
-        """Return the motion of an orbit."""
-        growth = float(np.log(max(float(np.abs(orbit.multipliers).max()), 1e-300))) / orbit.period
-        return Motion(
-            value,
-            STICK_SLIP if orbit.n_sticks else SLIDING_ORBIT,
-            orbit.largest,
-            orbit.smallest,
-            orbit.period,
-            orbit.stick_time,
-            orbit.n_sticks,
-            growth,
-            orbit.multipliers,
-            orbit.error,
-            orbit.y,
-        )
+        return Motion(STEADY, steady.y, x, x, period, growth=steady.growth, multipliers=multipliers)
 
     def trace_path(self, motion: Motion) -> np.ndarray:
         """Return a period of a motion (points, 3): time in s, the state that measures it, and its rate."""
@@ -111,7 +91,7 @@ class BranchTracer:
         is_orbit = motion.kind in (STICK_SLIP, SLIDING_ORBIT)
         for t in np.linspace(0.0, motion.period, PATH_POINTS + 1)[1:] if is_orbit else ():
             points.append(last)
-            last = self.oscillator.step(last.t, t - last.t)
+            last = self.oscillator.step(last.t, float(t))
         return np.array([(p.t, self.oscillator.measure(p.y), self.oscillator.measure(p.f)) for p in (*points, last)])
 
     # ---- special points between two values
@@ -213,8 +193,8 @@ def is_same(one: Motion, two: Motion) -> bool:
 def describe_irregular(closest: float) -> str:
     """Return a sentence on a motion that is neither at rest nor periodic."""
     return (
-        f"the motion from the start has not repeated in {MAX_RELEASES} slips, or {MAX_PERIODS} periods of the "
-        f"force; the closest states differ by {closest:.1e}: it is quasi-periodic, chaotic, or slow to settle."
+        f"the motion from the start has not repeated in {sum(RETURNS)} slips or periods of the force; the closest "
+        f"states differ by {closest:.1e}: it is quasi-periodic, chaotic, or slow to settle."
     )
 
 

@@ -1,8 +1,7 @@
-"""Motions that stay, and the points at which they begin, end or change."""
+"""A motion that stays: rest, steady sliding or a periodic motion."""
 
 from dataclasses import dataclass, field
 from math import nan
-from typing import Any
 
 import numpy as np
 
@@ -16,10 +15,10 @@ class Motion:
 
     Attributes
     ----------
-    value : float
-        Value of the parameter; NaN without one.
     kind : str
         "rest", "steady sliding", "stick-slip" or "sliding orbit".
+    y : numpy.ndarray
+        States (n,) of a point of the motion; of an orbit, one where it slides.
     largest, smallest : float
         Extreme values of the coordinate.
     period : float
@@ -34,12 +33,12 @@ class Motion:
         Factors by which disturbances grow in a period: Floquet multipliers; NaN where no derivative exists.
     error : float
         Relative change of the states after a period of an orbit.
-    y : numpy.ndarray
-        States (n,) of a point of the motion.
+    value : float
+        Value of the parameter; NaN without one.
     """
 
-    value: float
     kind: str
+    y: np.ndarray
     largest: float
     smallest: float
     period: float = nan
@@ -48,7 +47,7 @@ class Motion:
     growth: float = nan
     multipliers: np.ndarray = field(default_factory=lambda: np.zeros(0))
     error: float = 0.0
-    y: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    value: float = nan
 
     @property
     def amplitude(self) -> float:
@@ -61,49 +60,14 @@ class Motion:
         return self.period - self.stick_time
 
     @property
+    def multiplier(self) -> float:
+        """Return the largest modulus of the multipliers."""
+        return float(np.abs(self.multipliers).max()) if self.multipliers.size else nan
+
+    @property
     def stability(self) -> str:
         """Return "stable", "unstable", or "neutral"; empty where it is not known."""
         if self.growth != self.growth:
             return ""
         size = self.growth * self.period if self.period == self.period else self.growth
         return "neutral" if abs(size) <= NEUTRAL else "stable" if size < 0.0 else "unstable"
-
-    def as_row(self, parameter: str) -> dict[str, Any]:
-        """Return the numbers by name, as files and pandas have them."""
-        multiplier = float(np.abs(self.multipliers).max()) if self.multipliers.size else nan
-        return {
-            parameter or "model": self.value,
-            "motion": self.kind,
-            "stability": self.stability,
-            "period": self.period,
-            "amplitude": self.amplitude,
-            "largest": self.largest,
-            "smallest": self.smallest,
-            "stick_time": self.stick_time,
-            "slip_time": self.slip_time,
-            "sticks": self.n_sticks,
-            "multiplier": multiplier,
-            "growth": self.growth,
-        }
-
-
-@dataclass(frozen=True)
-class SpecialPoint:
-    """A value of the parameter at which motions begin, end or change.
-
-    Attributes
-    ----------
-    value : float
-        Value of the parameter.
-    kind : str
-        What happens as the parameter increases.
-    largest : float
-        Largest value of the coordinate there.
-    how : str
-        How the value was found.
-    """
-
-    value: float
-    kind: str
-    largest: float
-    how: str
