@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..arguments import INCREASING_ROW, PATH, PROGRESS, SETTINGS, WORKERS, Progress, check_arguments, mapping
+from ..arguments import INCREASING_ROW, PATH, PROGRESS, SETTINGS, TEXT, WORKERS, Progress, check_arguments, mapping
 from ..errors import SceneError
-from .options import reporter, with_progress_bar
+from .options import check_workers, reporter, with_progress_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -73,7 +73,7 @@ def orbit(
     return compute_orbits(resolve_motion(source, values), name, [*map(float, row)], reporter(progress))
 
 
-@check_arguments(source=PATH, over=OVER, values=SETTINGS, workers=WORKERS, progress=PROGRESS)
+@check_arguments(source=PATH, over=OVER, values=SETTINGS, workers=WORKERS, scheduler=TEXT, progress=PROGRESS)
 @with_progress_bar
 def map_motions(
     source: "str | Path",
@@ -81,6 +81,7 @@ def map_motions(
     values: Mapping[str, float | str] | None = None,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Progress | bool | None = None,
 ) -> "MapResult":
     """Map what the motions of a model end in over one or two parameters, with exact edges between the regions.
@@ -98,6 +99,8 @@ def map_motions(
     workers : int, optional
         Number of worker processes; by default all runs are done in this process, and by the command in one process for
         each processor.
+    scheduler : str, optional
+        Address of a Dask cluster, as ``"tcp://host:8786"``.
 
     Returns
     -------
@@ -117,7 +120,8 @@ def map_motions(
     from ..studies.motion_map.study import compute_map
 
     axes = expand_axes(over, DEFAULT_GRID, 2)
-    return compute_map(resolve_motion(source, values), axes, workers, reporter(progress))
+    check_workers(workers, scheduler)
+    return compute_map(resolve_motion(source, values), axes, workers, scheduler, reporter(progress))
 
 
 def resolve_motion(source: "str | Path", values: Mapping[str, float | str] | None) -> "RunSpec":

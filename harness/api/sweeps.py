@@ -24,7 +24,7 @@ from ..arguments import (
     text,
 )
 from ..errors import SceneError, by_interface, import_optional
-from .options import apply_options, reporter, with_progress_bar
+from .options import apply_options, check_workers, reporter, with_progress_bar
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -137,8 +137,7 @@ def sweep(
     import_optional("xarray", "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
-    if workers is not None and scheduler is not None:
-        raise SceneError("workers has no effect with scheduler, whose cluster has its own workers: leave one out")
+    check_workers(workers, scheduler)
     if name is not None and folder is None:
         raise SceneError("name has no effect without folder: give the folder for results as well")
     run = RunSpec(find_fmu(str(source)), values=dict(values or {}), follow=False)

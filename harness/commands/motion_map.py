@@ -1,14 +1,20 @@
 """map: regions of what motions end in."""
 
-import os
 from functools import partial
 
 import click
 
-from ..arguments import WORKERS
 from ..errors import SceneError
 from .orbit import split_axis
-from .terminal import SET_OPTION, RuleType, SectionedCommand, Terminal, result_options
+from .terminal import (
+    SCHEDULER_OPTION,
+    SET_OPTION,
+    WORKERS_OPTION,
+    SectionedCommand,
+    Terminal,
+    refuse_options,
+    result_options,
+)
 
 
 @click.command("map", cls=SectionedCommand)
@@ -21,11 +27,19 @@ from .terminal import SET_OPTION, RuleType, SectionedCommand, Terminal, result_o
     help="Parameter that varies, with its ends and 21 or N values. Once or twice.",
 )
 @SET_OPTION
-@click.option(
-    "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
-)
+@WORKERS_OPTION
+@SCHEDULER_OPTION
 @result_options
-def map_motions(source: str, over: tuple[str, ...], values: tuple[str, ...], workers: int, terminal: Terminal) -> None:
+@click.pass_context
+def map_motions(
+    context: click.Context,
+    source: str,
+    over: tuple[str, ...],
+    values: tuple[str, ...],
+    workers: int,
+    scheduler: str | None,
+    terminal: Terminal,
+) -> None:
     """Print what the motions of a model end in over one or two parameters, with exact edges between the regions.
 
     Of one body that slides steadily, the regions say whether steady sliding is stable and whether stick-slip goes on;
@@ -36,6 +50,8 @@ def map_motions(source: str, over: tuple[str, ...], values: tuple[str, ...], wor
       friction-fmus map belt --over v_belt=0.3:8 --over c=0.03:0.6
       friction-fmus map forced --over Omega=2:15:40
     """
+    if scheduler is not None:
+        refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     from ..api import map_motions as compute_map
     from ..results.provenance import describe_sources
     from ..results.result import save_result
@@ -47,7 +63,9 @@ def map_motions(source: str, over: tuple[str, ...], values: tuple[str, ...], wor
         raise SceneError("--over names a parameter twice")
     settings = parse_assignments("--set", values)
     with terminal.progress(1) as report:
-        compute = partial(compute_map, source, axes, settings, workers=workers, progress=partial(report, source))
+        local_workers = None if scheduler else workers
+        compute = partial(compute_map, source, axes, settings, workers=local_workers, scheduler=scheduler)
+        compute = partial(compute, progress=partial(report, source))
         folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])
         result = save_result(folder, compute, "map", describe_sources(source))
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

@@ -1,15 +1,16 @@
 """sweep: parameter sweeps."""
 
-import os
 from functools import partial
 from typing import Any
 
 import click
 
-from ..arguments import NATURAL, RUNS, WORKERS
+from ..arguments import NATURAL, RUNS
 from ..errors import MAX_VALUE_LENGTH, SceneError
 from .terminal import (
+    SCHEDULER_OPTION,
     SET_OPTION,
+    WORKERS_OPTION,
     RuleType,
     SectionedCommand,
     Terminal,
@@ -40,10 +41,8 @@ from .terminal import (
     "--measures",
     help="Measures, separated by commas. Default: final, and events if the FMU counts them.",
 )
-@click.option(
-    "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
-)
-@click.option("--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786.")
+@WORKERS_OPTION
+@SCHEDULER_OPTION
 @click.option("--name", help="Name of the result folder.")
 @run_options
 @result_options

@@ -18,7 +18,7 @@ import click
 from click.core import ParameterSource
 
 from .. import arguments
-from ..arguments import INTERFACES, MODEL_EXCHANGE, Rule
+from ..arguments import INTERFACES, MODEL_EXCHANGE, WORKERS, Rule
 from ..errors import HarnessError, format_value
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
@@ -115,6 +115,12 @@ SET_OPTION = click.option(
     multiple=True,
     metavar="NAME=VALUE,...",
     help="Parameters and start values; those of a scene are replaced. Repeatable.",
+)
+WORKERS_OPTION = click.option(
+    "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
+)
+SCHEDULER_OPTION = click.option(
+    "--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786."
 )
 STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
 RUN_OPTIONS = (

@@ -347,6 +347,18 @@ def test_the_map_of_the_belt_has_the_edges_of_closed_forms():
     assert shared.edges == result.edges
 
 
+@pytest.mark.slow
+def test_a_map_by_a_cluster_is_the_same():
+    distributed = pytest.importorskip("distributed")
+    source, over, values = native("belt"), {"c": [0.05, 0.1], "v_belt": [0.1, 0.12, 1.5]}, {"law": "coulomb"}
+    options = {"processes": False, "n_workers": 2, "threads_per_worker": 2, "dashboard_address": None}
+    with distributed.LocalCluster("127.0.0.1", protocol="tcp://", **options) as cluster:
+        result = harness.map_motions(source, over, values, scheduler=cluster.scheduler_address)
+    assert result.edges == harness.map_motions(source, over, values).edges
+    with pytest.raises(harness.SceneError, match="workers has no effect with scheduler"):
+        harness.map_motions(source, over, values, workers=2, scheduler="tcp://127.0.0.1:1")
+
+
 def test_the_map_of_a_forced_mass_counts_its_stops():
     result = harness.map_motions(native("forced"), {"Omega": [5.0, 6.0, 7.0]})
     assert result.labels == (*["2 sticks in a period"] * 2, "0 sticks in a period")

@@ -1,19 +1,22 @@
 """What motions end in at the points of a grid, and the edges between them along its lines, by bisection."""
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
 from ...errors import HarnessError
 from ...process.interrupt import check_interrupt
-from ...process.worker import WorkerPool
+from ...process.temporary_directory import temporary_directory
+from ...process.workers import open_workers
 from ...scenes.run_spec import RunSpec
 from ...simulation.edges import find_edges
+from ...simulation.fmu_archive import PROCESS_RESOURCES
 from ...simulation.native_equivalent import native_with_derivatives
 from ...simulation.oscillator import Oscillator, open_oscillator
 from ...simulation.poincare import CYCLE, ReturnMap
@@ -21,6 +24,7 @@ from .result import Edge, MapResult
 
 STEADY, STICK_SLIP, BOTH, NEITHER = "steady sliding", "stick-slip", "steady sliding or stick-slip", "neither"
 
+BUSY = Lock()  # messages of FMUs are captured by one thread at a time
 Line = tuple[np.ndarray, list[str], list[Edge], int]  # points (n, axes), labels, edges, and the number of runs
 
 
@@ -54,10 +58,18 @@ class LineSearch:
         return points, labels, edges, self.oscillator.n_runs - before
 
 
-def search_line(spec: RunSpec, names: tuple[str, ...], points: np.ndarray) -> Line:
-    """Search a line in a worker process."""
-    with open_oscillator(spec, names) as oscillator:
+def search_line(spec: RunSpec, fmu: bytes, names: tuple[str, ...], points: np.ndarray) -> Line:
+    """Search a line in a worker, which may not have the file of the FMU."""
+    with BUSY, open_oscillator(replace(spec, fmu=store_fmu(spec.fmu.name, fmu)), names) as oscillator:
         return LineSearch(oscillator).search(points)
+
+
+@cache
+def store_fmu(name: str, content: bytes) -> Path:
+    """Store an FMU until the process ends, and return its path."""
+    file = PROCESS_RESOURCES.enter_context(temporary_directory("map-")) / name
+    file.write_bytes(content)
+    return file
 
 
 def grid_lines(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -74,6 +86,7 @@ def compute_map(
     spec: RunSpec,
     axes: dict[str, np.ndarray],
     workers: int | None,
+    scheduler: str | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> MapResult:
     """Find what motions end in over one or two parameters.
@@ -86,6 +99,8 @@ def compute_map(
         Increasing values (n,) of each parameter.
     workers : int or None
         Number of worker processes; None for this process.
+    scheduler : str or None
+        Address of the scheduler of a Dask cluster, whose workers are used.
     report : callable
         Receives the progress from 0 to 1.
 
@@ -97,35 +112,26 @@ def compute_map(
         If the FMU is not suitable, or a worker dies.
     """
     names, run = tuple(axes), replace(spec, fmu=native_with_derivatives(spec.fmu))
-    lines, grid, results = grid_lines([*axes.values()]), tuple(axes.values()), list[Line]()
+    lines, grid = grid_lines([*axes.values()]), tuple(axes.values())
     with open_oscillator(run, names) as oscillator:
         units = {name: oscillator.units[name] for name in names}
         settings = {name: oscillator.default(name) for name in oscillator.parameters if name not in names}
-        if workers is None:
-            search = LineSearch(oscillator)
-            for line in lines:
-                results.append(search.search(line))
-                report(len(results) / len(lines))
-    if workers is not None:
-        results = search_in_workers(run, names, lines, workers, report)
-    labels = [label for _, found, _, _ in results[: len(grid[-1]) if len(grid) > 1 else 1] for label in found]
-    edges = tuple(edge for _, _, found, _ in results for edge in found)
-    return MapResult(spec, units, grid, tuple(labels), edges, sum(runs for *_, runs in results), settings)
-
-
-def search_in_workers(
-    spec: RunSpec, names: tuple[str, ...], lines: Sequence[np.ndarray], workers: int, report: Callable[[float], None]
-) -> list[Line]:
-    """Search lines in worker processes; return them in their order."""
-    spec = replace(spec, fmu=Path(os.path.abspath(spec.fmu)))
-    with WorkerPool(min(workers, len(lines))) as pool:
-        futures: list[Future[Line]] = [pool.submit(search_line, spec, names, line) for line in lines]
-        running = set(futures)
-        while running:
+    content = run.fmu.read_bytes()
+    with open_workers(scheduler, workers, len(lines)) as pool:
+        futures: dict[Future[Line], int] = {}
+        results = dict[int, Line]()
+        while len(results) < len(lines):
             check_interrupt()
-            running -= pool.wait_for_any(running)
-            report(1.0 - len(running) / len(lines))
-        try:
-            return [future.result() for future in futures]
-        except pool.death_errors:
-            raise HarnessError(f"{spec.fmu.name}: a worker process died") from None
+            while len(futures) < 2 * max(1, pool.size) and len(results) + len(futures) < len(lines):
+                number = len(results) + len(futures)
+                futures[pool.submit(search_line, run, content, names, lines[number])] = number
+            for future in pool.wait_for_any(futures):
+                try:
+                    results[futures.pop(future)] = future.result()
+                except pool.death_errors:
+                    raise HarnessError(f"{spec.fmu.name}: a worker process died") from None
+                report(len(results) / len(lines))
+    ordered = [results[number] for number in range(len(lines))]
+    labels = [label for _, found, _, _ in ordered[: len(grid[-1]) if len(grid) > 1 else 1] for label in found]
+    edges = tuple(edge for _, _, found, _ in ordered for edge in found)
+    return MapResult(spec, units, grid, tuple(labels), edges, sum(runs for *_, runs in ordered), settings)

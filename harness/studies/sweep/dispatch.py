@@ -9,23 +9,22 @@ index in the block. A kill or a full disk may cut off the last line, whose runs 
 
 import json
 import logging
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from time import monotonic, perf_counter
-from typing import Any, Self
+from time import perf_counter
+from typing import Self
 
 import numpy as np
 
-from ...errors import HarnessError, first_line, install_command
+from ...errors import HarnessError
 from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, check_interrupt
-from ...process.interruptible_wait import wait_for_any
 from ...process.temporary_directory import lock_path
-from ...process.worker import WorkerPool
+from ...process.workers import Workers, open_workers
 from .runner import BlockResult, SweepSpec, run_block, unload
 from .sampling import SweepPoints
 
@@ -142,67 +141,6 @@ class Checkpoint:
             self.delete()
 
 
-WORKER_TIMEOUT = 60.0  # s without a worker, after which the sweep ends
-
-
-class DaskCluster:
-    """The workers of a Dask client.
-
-    Dask reschedules the task of a worker that died, until the task has killed several workers.
-    """
-
-    def __init__(self, client: Any, address: str) -> None:
-        from distributed import KilledWorker
-
-        self.client, self.address = client, address
-        self.pool = client.get_executor(pure=False)
-        self.death_errors: tuple[type[Exception], ...] = (KilledWorker,)
-        self.last_seen = monotonic()
-
-    @property
-    def size(self) -> int:
-        """Return the number of tasks that run at a time; HarnessError after WORKER_TIMEOUT without workers."""
-        size = sum(self.client.nthreads().values())
-        if size:
-            self.last_seen = monotonic()
-        elif monotonic() > self.last_seen + WORKER_TIMEOUT:
-            raise HarnessError(f"the scheduler at {self.address} has lost its workers")
-        return size
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        return self.pool.submit(function, *arguments)
-
-    def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
-        """Wait until a future has ended, or for a short time; return those that have ended."""
-        return wait_for_any(futures)
-
-
-@contextmanager
-def connect_cluster(address: str, unload: Callable[[], None]) -> Iterator[DaskCluster]:
-    """Connect to the scheduler at an address; at the end every worker calls `unload`."""
-    try:
-        from distributed import Client
-    except ImportError:
-        raise HarnessError(f"a sweep over a cluster needs Dask: {install_command('cluster')}") from None
-    for name in ("distributed", "distributed.client"):  # do not log lost workers
-        logging.getLogger(name).setLevel(logging.ERROR)
-    try:
-        # not as the default, which xarray uses to write a file, even after it failed to connect
-        client = Client(address, timeout=10, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise HarnessError(f"no scheduler found at {address}: {first_line(error)}") from None
-    with client:
-        cluster = DaskCluster(client, address)
-        if not cluster.size:
-            raise HarnessError(f"the scheduler at {address} has no workers; start one: dask worker {address}")
-        try:
-            yield cluster
-        finally:
-            cluster.pool.shutdown(wait=False)
-            with suppress(Exception):  # a worker may have ended
-                client.run(unload)
-
-
 LOG = logging.getLogger(__name__)
 MAX_BLOCK_SIZE = 10_000  # runs
 BLOCK_TIME = 0.5  # target run time of a block in s
@@ -238,44 +176,6 @@ class Sweep:
         return Checkpoint(folder / f".{self.key}.checkpoint", len(self.points), self.columns)
 
 
-class InProcess:
-    """Runs tasks at once in this process, for callers without worker processes."""
-
-    size = 1
-    death_errors: tuple[type[Exception], ...] = ()
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Call function(*arguments) and return its result as a finished future."""
-        future: Future[Any] = Future()
-        try:
-            future.set_result(function(*arguments))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-    def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
-        """Return the futures that are done, which are all."""
-        return set(futures)
-
-
-@contextmanager
-def open_workers(
-    scheduler: str | None, workers: int | None, runs: int
-) -> Iterator[WorkerPool | DaskCluster | InProcess]:
-    """Open the workers: processes on this machine, or the cluster of a scheduler."""
-    if scheduler is not None:
-        with connect_cluster(scheduler, unload) as connection:
-            yield connection
-    elif workers is None:
-        try:
-            yield InProcess()
-        finally:
-            unload()
-    else:
-        with WorkerPool(min(workers, runs)) as pool:
-            yield pool
-
-
 def run_pending(
     sweep: Sweep,
     checkpoint: Checkpoint,
@@ -293,7 +193,7 @@ def run_pending(
     if not spans:
         return 0.0
     try:
-        with open_workers(scheduler, workers, total - checkpoint.n_done) as pool:
+        with open_workers(scheduler, workers, total - checkpoint.n_done, unload) as pool:
             for first, values, messages in completed_blocks(sweep, pool, spans):
                 checkpoint.add(first, values, messages)
                 LOG.debug("%d of %d runs are finished", checkpoint.n_done, total)
@@ -309,7 +209,7 @@ def run_pending(
 
 
 def completed_blocks(
-    sweep: Sweep, workers: WorkerPool | DaskCluster | InProcess, spans: list[Span]
+    sweep: Sweep, workers: Workers, spans: list[Span]
 ) -> Iterator[tuple[int, np.ndarray, dict[int, str]]]:
     """Do the runs of all spans in blocks that grow until each takes half a second.
 
