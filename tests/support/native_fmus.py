@@ -20,7 +20,7 @@ def require_compiler():
 def build_native_fmus():
     """Return the folder of the native FMUs for Linux."""
     require_compiler()
-    return build_cache.build_once("linux64", "--native", "--platform", "linux64")
+    return build_cache.build_once("linux64", "--native", "--platform", "linux64", optimised=True)
 
 
 @cache
