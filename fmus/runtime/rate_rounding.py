@@ -9,7 +9,7 @@ from .vectors import ContactVector, StateVector, dynamic_part, kinematic_rates, 
 RATE_ROUNDING = 2.0 * EPSILON
 # Rounding errors of a position in one step, in those of its speed times the step: the coefficients of dop853 are up to
 # 43, with both signs.
-POSITION_ROUNDING = 32.0
+POSITION_ROUNDING = 16.0
 
 
 def smallest_sizes(model, step, t, y: StateVector, modes: ContactVector, h) -> StateVector:
