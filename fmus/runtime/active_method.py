@@ -8,6 +8,7 @@ from .method_registry import methods
 from .vectors import ContactVector, RateVector, StateVector, elementwise_max, velocity_indices
 
 EXACT_ITEM = ("exact", EXACT, "closed form of each linear segment, with events; hybrid law only")
+SMALLEST_FLOOR = 1e-150  # is a divisor, so not zero; its inverse times an error does not overflow
 METHOD_ITEMS = tuple((label, file.NUMBER, file.TEXT) for label, file, _ in methods)
 
 

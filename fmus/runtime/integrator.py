@@ -7,7 +7,7 @@ ahead of t does not show.
 from math import fabs, inf, nan
 
 from . import conditions, contact_lcp, ode23, phase_repetition, step_control, step_end
-from .active_method import METHOD_ITEMS
+from .active_method import METHOD_ITEMS, SMALLEST_FLOOR
 from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, OK, STUCK, TOO_MANY_STEPS
 from .internal_step import InternalStep
 from .step_end import OVERFLOW_LIMIT
@@ -24,7 +24,6 @@ from .vectors import (
 )
 
 FLOOR_SHARE = 0.03  # of the largest magnitude of a state so far; errors are relative to no less
-SMALLEST_FLOOR = 1e-150  # is a divisor, so not zero; its inverse times an error does not overflow
 STEP_END_TOLERANCE = 1e-15  # relative; communication points this close to the end of an internal step are there
 # Limits for one communication step, so that an error comes within half a minute, on a slow machine too:
 MAX_BATCHES, BATCH_STEPS = 2000, 1000  # evaluations are checked after each batch

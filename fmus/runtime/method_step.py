@@ -7,6 +7,7 @@ SIAM J. Sci. Comput. 18 (1997) 1-22).
 from math import inf
 
 from . import conditions, contact_lcp, event_location, phase_repetition, planar_contact, step_end, step_limits
+from .active_method import SMALLEST_FLOOR
 from .codes import DIVERGED, EPSILON, NEEDS_REPETITION, OK, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
 from .interpolant import largest_of
@@ -18,6 +19,7 @@ from .vectors import (
     StateVector,
     complete_rates,
     contact_indices,
+    elementwise,
     elementwise_max,
     error_size,
     magnitude,
@@ -84,6 +86,7 @@ def accept_proposal(model, step):
     scale = error_size(y)
     method.raise_scale_floor(model, scale)
     scale = elementwise_max(method.error_scale_floor, scale)
+    floor = scale  # of the step, without proposals; set when one is rejected
     attempts = 0
     while True:
         y1, f1, e = method.propose(model, step, modes, t, y, f, h)
@@ -108,9 +111,23 @@ def accept_proposal(model, step):
         step.n_rejected += 1
         if attempts == 0:
             step.save_scale_floor()
+            floor = step.start_counters.error_scale_floor
         attempts += 1
-        if error * tolerance < ROUGH_ERROR:
-            raise_floor_by_proposal(model, step, h, y, f, y1, f1, size1, size2)
+        size3, other_error = size1, error
+        if error * tolerance >= ROUGH_ERROR:  # False for NaN
+            change = h * magnitude(f1)
+            size3 = elementwise_max(size1, change)
+            d = d - if_at_rest(y, f, scale, d)
+            e = d / size2
+            other_error = h * max_of(e) / tolerance
+            for i in planar_indices:
+                other_error = planar_contact.larger_error(model, step, modes, h, y1, d, other_error, i)
+        if other_error * tolerance < ROUGH_ERROR and is_roughly_right(h, y, f, y1, f1, size2, scale):
+            if other_error < error:
+                e = method.floor_share * if_at_rest(y, f, scale, size3)
+                floor = elementwise_max(floor, e)
+            method.error_scale_floor = floor
+            method.raise_scale_floor(model, size1)
             scale = elementwise_max(method.error_scale_floor, scale)
         if h <= h_min or attempts == MAX_TRIES:
             return STALLED if error < inf and sum_of(size1) < OVERFLOW_LIMIT else DIVERGED
@@ -138,33 +155,32 @@ def accept_proposal(model, step):
     return OK
 
 
-def raise_floor_by_proposal(
-    model,
-    step,
-    h,
-    y: StateVector,
-    f: RateVector,
-    y1: StateVector,
-    f1: RateVector,
-    size1: StateVector,
-    size2: StateVector,
-):
-    """Raise the scale floor by a rejected proposal that is roughly right.
+@elementwise
+def if_at_rest(value, rate, scale, number):
+    """Return a number for a state that has always been zero and begins without a rate, and 0 for others.
 
-    It shows how large states become that are zero so far, and whose error is always large relative to what they reach.
-    A rate that is large relative to that shows an unstable proposal.  So does a change that the rates at neither end
-    explain.
+    In a method of order 3, the error of a state that starts with t^4 is as large as the state, however short the step.
+    It is relative to what the state reaches in the first proposal whose other states are roughly right.
     """
-    method = step.active_method
+    return number if value == 0.0 and rate == 0.0 and scale <= SMALLEST_FLOOR else 0.0
+
+
+def is_roughly_right(
+    h, y: StateVector, f: RateVector, y1: StateVector, f1: RateVector, size: StateVector, scale: StateVector
+):
+    """Return whether a rejected proposal shows how large states become that are zero so far.
+
+    Their error is always large relative to what they reach.  A rate that is large relative to that shows an unstable
+    proposal.  So does a change that the rates at neither end explain.
+    """
     rate0, rate1 = magnitude(f), magnitude(f1)
     change = y1 - y
     change = magnitude(change)
     most = elementwise_max(rate0, rate1)
     excess = change - ROUGH_CHANGE * h * most
-    d = rate1 / size2
-    if h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0:
-        method.error_scale_floor = step.start_counters.error_scale_floor
-        method.raise_scale_floor(model, size1)
+    d = rate1 / size
+    d = d - if_at_rest(y, f, scale, d)
+    return h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0
 
 
 def end_at_first_event(model, step):
