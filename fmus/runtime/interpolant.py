@@ -39,6 +39,12 @@ class Interpolant:
         self.c2 = h * step.f0 - c1
         self.c3 = 2.0 * c1 - h * (step.f0 + step.f1)
 
+    def set_line(self, step):
+        """Set the straight line between both ends of a step."""
+        self.ready, self.h, self.degree = True, step.h_full, 3
+        self.c0, self.c1 = step.y0, step.y1 - step.y0
+        self.c2 = self.c3 = 0.0
+
     def evaluate(self, elapsed) -> StateVector:
         """Return the state `elapsed` seconds after the start of the step."""
         s = elapsed / self.h

@@ -37,7 +37,15 @@ INTERPOLATION_ERROR = 10.0  # of a state at an event, relative to the solver tol
 
 def advance_with_method(model, step):
     """Compute a step that meets the tolerance, and end it at the first event in it.  Returns a status."""
+    for i in planar_indices:
+        duration = planar_contact.time_to_rest(model, step, i)
+        if duration < inf:
+            return step_end.end_at_rest(model, step, duration, i)
+    for i in planar_indices:
+        planar_contact.tighten_tolerance(model, step, step.modes0, i)
     status = accept_proposal(model, step)
+    for _ in planar_indices:
+        planar_contact.restore_tolerance(model, step)
     if status != OK:
         return status
     if model.has_dry_friction and step.is_hybrid and not model.is_coupled and not model.has_conditions:
@@ -100,8 +108,6 @@ def accept_proposal(model, step):
             least = smallest_sizes(model, step, t + h, y, modes, h)  # the proposed state may be unstable
             e = d / elementwise_max(size2, least)
             error = h * max_of(e) / tolerance
-        for i in planar_indices:
-            error = planar_contact.larger_error(model, step, modes, h, y1, d, error, i)
         share = 1.0
         if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
             if has_narrow_features(model, step):
@@ -212,10 +218,6 @@ def end_at_first_event(model, step):
         if location.must_shorten:
             return NEEDS_REPETITION
         return step_end.end_at(model, step, end)
-    for i in planar_indices:
-        duration = planar_contact.time_to_rest(model, step, i)
-        if duration < inf:
-            return step_end.end_at_rest(model, step, duration, i)
     if model.is_coupled and step.is_hybrid:
         step.y1 = contact_lcp.stop_slips(model, step.t1, step.y1, step.modes0)
         step.f1 = complete_rates(step.y1, step.f1)

@@ -5,7 +5,7 @@ equals the load, up to the holding limit; a body that breaks away starts along i
 
 While the size of the slip falls, a step covers a share of the time in which the present rate would remove it.  For a
 constant load that time is a lower bound on the time to rest, so no step passes the kink of the friction at zero slip.
-Where the slip is below the errors of the method and the load below the friction, the motion to rest has a closed form:
+Where the slip is below the errors of the method and the load below the friction, a step to rest has a closed form:
 
     d(s (d + w cos(phi)))/dt = w^2 - d^2
 
@@ -15,16 +15,18 @@ A body whose load exceeds the friction leaves along its load from where its slip
 
 from math import inf, sqrt
 
+from . import contact_lcp
 from .codes import EPSILON, ROUNDOFF_MARGIN, STUCK
 from .contact_lcp import CoupledFriction
-from .vectors import ContactIndex, ContactVector, StateVector, select_kinematic
+from .vectors import ContactIndex, ContactVector, StateVector, elementwise_max, error_size, select_kinematic
 
 # Of the time in which the present rate would remove the slip, or has built it up
 APPROACH_SHARE, GROWTH_SHARE = 0.75, 3.0
 FIRST_SHARE = 1e-12  # of the first step after a break-away: duration after which the slip begins with a direction
 ROUNDING_SHARE = 1e-12  # of the largest slip since the last event; a smaller one is a rounding error
 ERROR_SHARE = 1e-3  # of the slip, by which errors may change it in a step
-UNCERTAIN = 2.0  # relative error of a step where they change it more
+SMALLEST_TOLERANCE = 1e-13  # lower ones are rounding errors
+RESOLVED = 100.0  # shortest steps in which a slip vanishes that a method can resolve
 CONSTANT_SHARE = 0.01  # of the excess of friction over load, by which the load may change up to the rest
 TINY = 1e-300  # avoids a division by zero
 TIME_RESOLUTION = 64.0 * EPSILON  # share of the time since the start; shorter steps stall
@@ -32,6 +34,8 @@ TIME_RESOLUTION = 64.0 * EPSILON  # share of the time since the start; shorter s
 
 class PlanarFriction(CoupledFriction):
     """Oscillator with contacts in a plane."""
+
+    run_tolerance: float  # while a step has a finer one; else 0.0
 
     def planar_motion(
         self, t: float, y: StateVector, modes: ContactVector
@@ -87,19 +91,36 @@ def begin_slip(model, step, i: ContactIndex) -> StateVector:
     return select_kinematic(states, states + duration * f)
 
 
-def larger_error(model, step, modes: ContactVector, h, y1: StateVector, e: StateVector, error, i: ContactIndex):
-    """Return the relative error of a proposed step, above 1 if the errors `h * e` of the states turn the slip.
+def tighten_tolerance(model, step, modes: ContactVector, i: ContactIndex):
+    """Tighten the tolerance of a step by which errors turn the slip, or move its rest; see `restore_tolerance`.
 
-    Where the slip is small, they may be within the tolerance and yet larger than the slip.
+    Errors of a small slip may be within the tolerance and yet turn it.  A load that is nearly as large as the friction
+    takes long to stop the body, and an error of the slip moves its rest by that much more.
     """
-    if modes[i] == STUCK or error > 1.0 or h <= TIME_RESOLUTION * step.t0:
-        return error
-    y2 = y1 + h * e
-    x, y, _load_x, _load_y, friction = model.planar_motion(step.t0 + h, y1, modes)
-    other_x, other_y, _load_x2, _load_y2, _friction2 = model.planar_motion(step.t0 + h, y2, modes)
-    dx, dy = other_x[i] - x[i], other_y[i] - y[i]
-    is_small = ERROR_SHARE * sqrt(x[i] * x[i] + y[i] * y[i]) < sqrt(dx * dx + dy * dy)
-    return UNCERTAIN if friction[i] > 0.0 and is_small else error
+    if model.run_tolerance == 0.0:
+        model.run_tolerance = step.tolerance
+    x, y, load_x, load_y, friction = model.planar_motion(step.t0, step.y0, modes)
+    size = sqrt(x[i] * x[i] + y[i] * y[i])
+    if modes[i] == STUCK or friction[i] == 0.0 or size == 0.0:
+        return
+    y2 = error_size(step.y0)
+    y2 = elementwise_max(step.active_method.error_scale_floor, y2)
+    scales = model.slip_magnitudes(step.t0, y2)
+    load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
+    rate_x, rate_y = load_x[i] - friction[i] * x[i] / size, load_y[i] - friction[i] * y[i] / size
+    if size < RESOLVED * TIME_RESOLUTION * step.t0 * sqrt(rate_x * rate_x + rate_y * rate_y):
+        return
+    finer = ERROR_SHARE * size / scales[i]
+    if load < friction[i] and model.run_tolerance * (1.0 - load / friction[i]) < finer:
+        finer = model.run_tolerance * (1.0 - load / friction[i])
+    finer = finer if finer > SMALLEST_TOLERANCE else SMALLEST_TOLERANCE
+    step.tolerance = finer if finer < step.tolerance else step.tolerance
+
+
+def restore_tolerance(model, step):
+    """Return to the tolerance of the run."""
+    if model.run_tolerance > 0.0:
+        step.tolerance, model.run_tolerance = model.run_tolerance, 0.0
 
 
 def has_reversed(model, step, i: ContactIndex):
@@ -115,11 +136,11 @@ def has_reversed(model, step, i: ContactIndex):
 
 
 def time_to_rest(model, step, i: ContactIndex):
-    """Return how long after a step the slip vanishes, if it falls and the method does not resolve it; else inf."""
+    """Return how long after the start of a step the slip vanishes, if a method need not resolve its fall; else inf."""
     location = step.event_location
     if step.modes0[i] == STUCK or location.is_frictionless[i] > 0.0:
         return inf
-    x, y, load_x, load_y, friction = model.planar_motion(step.t1, step.y1, step.modes0)
+    x, y, load_x, load_y, friction = model.planar_motion(step.t0, step.y0, step.modes0)
     size = sqrt(x[i] * x[i] + y[i] * y[i])
     if size == 0.0:
         return inf  # it has just broken away
@@ -128,16 +149,18 @@ def time_to_rest(model, step, i: ContactIndex):
         return inf
     rate = sqrt((along - friction[i]) * (along - friction[i]) + across * across)
     rounding = ROUNDING_SHARE * location.peaks[i] + ROUNDOFF_MARGIN * location.roundings[i]
-    if size <= rounding + TIME_RESOLUTION * step.t1 * rate:
-        return 0.0
+    if size <= rounding + TIME_RESOLUTION * step.t0 * rate:
+        return size / (rate + TINY)
     load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
-    if size > step.tolerance * location.peaks[i] or not load < friction[i]:
+    floors = contact_lcp.slip_floors(model, step, step.t0, step.y0)
+    peak = location.peaks[i] if location.peaks[i] > floors[i] else floors[i]
+    if size > step.tolerance * peak or not load < friction[i]:
         return inf
     duration = size * (friction[i] + along) / ((friction[i] - load) * (friction[i] + load))
-    y2 = step.y1 + duration * step.f1
-    _x2, _y2, load_x2, load_y2, _friction2 = model.planar_motion(step.t1 + duration, y2, step.modes0)
+    y2 = step.y0 + duration * step.f0
+    _x2, _y2, load_x2, load_y2, _friction2 = model.planar_motion(step.t0 + duration, y2, step.modes0)
     change = sqrt(
         (load_x2[i] - load_x[i]) * (load_x2[i] - load_x[i]) + (load_y2[i] - load_y[i]) * (load_y2[i] - load_y[i])
     )
     is_constant = change <= CONSTANT_SHARE * (friction[i] - load)
-    return duration if is_constant and step.t1 + duration < step.t_end else inf
+    return duration if is_constant and step.t0 + duration < step.t_end else inf

@@ -63,19 +63,22 @@ def end_at(model, step, h):
 
 
 def end_at_rest(model, step, duration, i: ContactIndex):
-    """End a step where the slip of a contact in a plane vanishes, `duration` seconds after its end.  Returns a status.
+    """Step to where the slip of a contact in a plane vanishes, `duration` seconds ahead.  Returns a status.
 
-    The duration is so short that the rates at the end of the step give the states.
+    The duration is so short that the rates at its start give the states.
     """
-    step.y1 = step.y1 + duration * step.f1
-    step.t1 = step.roundoff.event_time(step.t0, step.h_full + duration)
+    step.roundoff.t0 = step.roundoff.t1
+    step.h_full = duration
+    step.t1 = step.roundoff.event_time(step.t0, duration)
+    step.y1 = step.y0 + duration * step.f0
     ends = contact_vector()
     for j in contact_indices:
         ends[j] = inf
-    ends[i] = step.h_full
+    ends[i] = duration
     step.y1, step.modes1, step.has_consistent_modes = contact_lcp.resolve_after_event(
-        model, step, step.h_full, ends, tie_tolerance(model, step)
+        model, step, duration, ends, tie_tolerance(model, step)
     )
+    step.interpolant.set_line(step)
     step.h_next = 0.0  # the last steps before rest are short
     return end_at_event(model, step)
 
