@@ -22,7 +22,7 @@ from .fmu_instance import CALL_FAILURES, FmuInstance
 from .fmu_variables import METHOD
 from .model_data import read_model_data
 from .native_equivalent import check_has_events
-from .runner import open_instance, open_session
+from .runner import open_instance
 from .session import Session, resolve_settings
 from .variable_values import enumeration_labels, variable_unit
 from .variational import VariationalRun, state_variables
@@ -152,9 +152,8 @@ class Oscillator:
         reals = [*dict.fromkeys((*self.states, *self.rates, "solver.t_next"))]
         self.positions = [[reals.index(name) for name in group] for group in (self.states, self.rates)]
         self.n_modes, read = len(modes), [*modes, *["events.count"] * bool(modes), *reals]
-        session = resources.enter_context(open_session(self.spec, (*self.varied, *self.initial), read))
-        assert isinstance(session, Session)
-        self.session, self.instance = session, session.instance
+        self.instance = resources.enter_context(open_instance(self.spec, self.folder))
+        self.session = Session(self.instance, self.spec, (*self.varied, *self.initial), read)
         self.last_equilibrium: np.ndarray | None = None
         self.set_point([self.default(name) for name in varied])
         self.offsets = np.array([self.default(name) for name in self.initial])
@@ -250,7 +249,7 @@ class Oscillator:
     @cached_property
     def exchange(self) -> FmuInstance:
         """Return an instance for model exchange."""
-        return self.resources.enter_context(open_instance(replace(self.spec, exchange=True)))
+        return self.resources.enter_context(open_instance(replace(self.spec, exchange=True), self.folder))
 
     # ---- coordinates
 

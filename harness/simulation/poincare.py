@@ -32,6 +32,7 @@ RETURNS = (16, 48, 192)  # until a motion has repeated; after each, Newton's met
 MAX_MULTIPLE = 8  # slips, or periods of the force, of the longest period
 CHUNKS = 12  # communication steps in a turn
 GRAZING = 1e-7  # relative distance from the largest amplitude of orbits that do not stick
+MAX_DOUBLINGS = 60  # of a change of speed
 BESIDE = 1e-6  # relative difference of the speed of a body that sticks at once
 JUMP = 1e-5  # growth of an amplitude at its zero that is a jump
 ROOT_RTOL = 1e-13  # relative accuracy of zeros
@@ -68,11 +69,11 @@ class ReturnMap:
     Attributes
     ----------
     reversal : float
-        Last distance of the speed at which the slip reverses from that of steady sliding.
+        Last change of the speed of steady sliding by which the slip reverses.
     """
 
     def __init__(self, oscillator: Oscillator) -> None:
-        self.oscillator, self.reversal = oscillator, 1.0
+        self.oscillator, self.reversal = oscillator, 1e-3
 
     # ---- what a motion ends in
 
@@ -253,16 +254,21 @@ class ReturnMap:
         def reverses(change: float) -> bool:
             return oscillator.begin(y + change * oscillator.speeds).modes != modes
 
-        sizes = [self.reversal * 4.0**k for k in range(-1, 1)] + [4.0**k for k in range(-30, 31)]
-        changes = (sign * size for size in sizes for sign in (1.0, -1.0))
-        high = next(filter(reverses, changes), None)
-        if high is None:
+        high, low = self.reversal, self.reversal * (1.0 - 2.0 * BESIDE)
+        for _ in range(MAX_DOUBLINGS):
+            if reverses(high) or reverses(-high):
+                break
+            low, high = high, 4.0 * high
+        else:
             return None
-        low = 0.0
-        while abs(high - low) > BESIDE * abs(high):
+        if not reverses(high):
+            low, high = -low, -high
+        if reverses(low):
+            low = 0.0
+        while abs(high - low) > 2.0 * BESIDE * abs(high):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if reverses(middle) else (middle, high)
-        self.reversal = abs(high)
+        self.reversal = high
         for _ in range(MAX_ITERATIONS):
             end = oscillator.begin(y + high * oscillator.speeds)
             begin = oscillator.begin(y + low * oscillator.speeds)

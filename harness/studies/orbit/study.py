@@ -143,8 +143,8 @@ class BranchTracer:
             lambda value: self.map.sticks_again(self.steady_sliding(value)), low, high, sticks_below, not sticks_below
         )
         edge = last if sticks_below else first
-        motions = [motion for motion in self.find_motions(edge, []) if motion.kind == STICK_SLIP]
-        x = motions[0].largest if motions else nan
+        turn = self.map.turn_after_stick(self.steady_sliding(edge))
+        x = nan if turn is None else self.oscillator.measure(self.map.locate_turn(*turn).y)
         kind = "stick-slip ends" if sticks_below else "stick-slip begins"
         return SpecialPoint(edge, kind, x, "bisection on whether it sticks again")
 
