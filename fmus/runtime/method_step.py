@@ -126,8 +126,6 @@ def accept_proposal(model, step):
             d = d - if_at_rest(y, f, scale, d)
             e = d / size2
             other_error = h * max_of(e) / tolerance
-            for i in planar_indices:
-                other_error = planar_contact.larger_error(model, step, modes, h, y1, d, other_error, i)
         if other_error * tolerance < ROUGH_ERROR and is_roughly_right(h, y, f, y1, f1, size2, scale):
             if other_error < error:
                 e = method.floor_share * if_at_rest(y, f, scale, size3)
