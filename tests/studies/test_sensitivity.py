@@ -11,6 +11,7 @@ from external_fmus import build_external_fmus, edited_copy
 from fmi3_fixtures import build_fmi3_fmus
 from models import MODELS
 from native_fmus import build_native_fmus
+from variants import slow_after
 
 import harness
 from benchmarks.campaigns.random_models import STOP, random_structure, random_values, write_model
@@ -147,7 +148,7 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "parameters", "values", "outputs"), OTHERS)
+@pytest.mark.parametrize(("name", "parameters", "values", "outputs"), slow_after(2, OTHERS))
 def test_derivatives_are_those_of_differences(name, parameters, values, outputs):
     times = [2.0, 4.6, 5.1, 8.0] if name in ("stickslip", "pacejka") else [0.8, 1.7, 2.5, 3.3]
     fmu = build_native_fmus() / f"{name}.fmu"
