@@ -16,20 +16,15 @@ Circuits and Systems I 47 (2000) 204-220.
 
 from collections.abc import Callable, Sequence
 from ctypes import (
-    CDLL,
-    Structure,
     byref,
-    c_bool,
     c_double,
     c_int,
-    c_int64,
     c_size_t,
     c_uint32,
     c_void_p,
     cast,
 )
 from dataclasses import dataclass
-from functools import cache
 from io import StringIO
 from math import inf, nan
 from pathlib import Path
@@ -38,7 +33,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from ..errors import HarnessError, install_command
+from ..errors import HarnessError
 from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from .array_elements import ArrayElement, split_own_arrays, start_values
@@ -48,10 +43,23 @@ from .fmu_instance import CALL_FAILURES, WARNING, FmuInstance, LogCapture
 from .model_data import read_model_data
 from .stepping import TIME, interpolate
 from .variable_values import REAL_TYPES, find_bound
-from .whole_run import compile_library
+from .variational_loop import (
+    EVENT,
+    FAILED,
+    FUNCTION_FIELDS,
+    FUNCTIONS,
+    GRAZE,
+    REACHED,
+    STEP_EVENT,
+    TABLEAU,
+    TERMINATED,
+    TOO_MANY_STEPS,
+    ParameterStruct,
+    RunStruct,
+    load_library,
+)
+from .variational_solution import EventDerivative, Undefined, VariationalSolution
 
-SOURCE = Path(__file__).with_name("variational.c")
-REACHED, EVENT, GRAZE, STEP_EVENT, TERMINATED, FAILED, TOO_MANY_STEPS = range(7)  # of variational.c
 EXTENDED, DENSE, SAMPLES = 16, 8, 9  # stages with those of the interpolant, rows of two buffers
 MAX_STEPS, STEPS_PER_CHECK = 1_000_000, 1000
 DEFAULT_RTOL = 1e-11
@@ -63,143 +71,6 @@ SAME = 1e-5  # relative difference of derivatives that are the same
 TIGHTER = 1e-3  # factor of the tolerance that the FMU receives, for its own decisions on events
 MODE_UPDATES = 3  # until an FMU has the modes of a point: from sliding against its mode it first sticks
 RESET = 100.0  # in tolerances: smaller changes of the states at an event are errors of the integration
-
-
-class ParameterStruct(Structure):
-    """The struct Parameter of variational.c."""
-
-    _fields_ = (
-        ("reference", c_uint32),
-        ("width", c_size_t),
-        ("element", c_size_t),
-        ("input", c_int64),
-        ("value", c_double),
-    )
-
-
-FUNCTION_FIELDS = ("set_time", "set_states", "get_rates", "get_indicators", "get", "set", "derive", "complete")
-FUNCTIONS = {
-    "2.0": ("SetTime", "SetContinuousStates", "GetDerivatives", "GetEventIndicators", "GetReal", "SetReal"),
-    "3.0": (
-        "SetTime",
-        "SetContinuousStates",
-        "GetContinuousStateDerivatives",
-        "GetEventIndicators",
-        "GetFloat64",
-        "SetFloat64",
-    ),
-}
-ARRAYS = (
-    *("z", "z1", "k", "dense", "largest", "nominals", "g", "g1", "samples"),
-    *("largest_g", "t_far", "g_far", "touch", "work"),
-)
-TABLEAU = {"a": "A", "c": "C", "b": "B", "e3": "E3", "e5": "E5", "a_extra": "A_EXTRA", "c_extra": "C_EXTRA", "d": "D"}
-
-
-class RunStruct(Structure):
-    """The struct Run of variational.c."""
-
-    _fields_ = (
-        ("instance", c_void_p),
-        *((name, c_void_p) for name in FUNCTION_FIELDS),
-        ("fmi", c_int64),
-        *((name, c_size_t) for name in ("n", "m", "q", "r", "n_inputs")),
-        *((name, c_void_p) for name in ("states", "rates", "outputs", "inputs", "parameters")),
-        *((name, c_void_p) for name in TABLEAU),
-        ("table", c_void_p),
-        *((name, c_double) for name in ("rtol", "graze")),
-        *((name, c_size_t) for name in ("max_steps", "n_steps", "n_rhs")),
-        *((name, c_double) for name in ("t", "h", "t_event")),
-        *((name, c_void_p) for name in ARRAYS),
-        ("times", c_void_p),
-        ("n_times", c_size_t),
-        ("next", c_size_t),
-        ("values", c_void_p),
-        ("indicator", c_int64),
-        ("is_fresh", c_bool),
-    )
-
-
-@cache
-def load_library() -> CDLL:
-    """Return the compiled loop.
-
-    Raises
-    ------
-    HarnessError
-        If there is no compiler.
-    """
-    library = compile_library(SOURCE)
-    if library is None:
-        raise HarnessError(f"derivatives need a C compiler, and there is none: {install_command('native')}")
-    library.indicator_slope.restype = library.moved_indicator.restype = c_double
-    return library
-
-
-@dataclass(frozen=True)
-class EventDerivative:
-    """An event.
-
-    Attributes
-    ----------
-    t : float
-        Time in s.
-    indicator : int
-        Index of the event indicator.
-    before, after : tuple of int
-        Modes of the contacts of an FMU of this project.
-    slopes : numpy.ndarray
-        Derivatives (parameters,) of the time.
-    """
-
-    t: float
-    indicator: int
-    before: tuple[int, ...]
-    after: tuple[int, ...]
-    slopes: np.ndarray
-
-
-@dataclass(frozen=True)
-class Undefined:
-    """A time in s from which derivatives by some parameters (k,) do not exist, its indicator (-1: none), and why.
-
-    If `is_moment`, they exist again after this time.
-    """
-
-    t: float
-    indicator: int
-    reason: str
-    parameters: tuple[str, ...]
-    is_moment: bool = False
-
-
-@dataclass(frozen=True)
-class VariationalSolution:
-    """Outputs and their derivatives.
-
-    Attributes
-    ----------
-    values : numpy.ndarray
-        Outputs (times, outputs).
-    left, right : numpy.ndarray
-        Derivatives (times, parameters, outputs) for decreasing and for increasing parameters, NaN where they do not
-        exist. The derivative exists where they are equal.
-    used : numpy.ndarray
-        Whether something depends on each parameter (parameters,).
-    events, undefined
-        Events, and times at which derivatives cease to exist.
-    n_steps, n_rhs : int
-        Steps, and evaluations of the right-hand side.
-    """
-
-    values: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
-    used: np.ndarray
-    events: tuple[EventDerivative, ...]
-    undefined: tuple[Undefined, ...]
-    n_steps: int
-    n_rhs: int
 
 
 @dataclass

@@ -19,7 +19,8 @@ from ...simulation.native_equivalent import check_has_events, native_with_deriva
 from ...simulation.session import resolve_settings
 from ...simulation.stepping import TIME, check_inputs, check_rates
 from ...simulation.variable_values import REAL_TYPES, effective_value, variable_unit
-from ...simulation.variational import DEFAULT_RTOL, VariationalSolution, differentiate, state_variables
+from ...simulation.variational import DEFAULT_RTOL, differentiate, state_variables
+from ...simulation.variational_solution import VariationalSolution
 from .result import SensitivityEvent, SensitivityResult
 
 DEFAULT_POINTS = 1001  # recorded times
