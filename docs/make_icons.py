@@ -153,8 +153,18 @@ def servo(axes: Axes) -> None:
         axes.add_patch(Circle(point, 7, fc=RED, ec=RED))
 
 
+def puck(axes: Axes) -> None:
+    """Draw a disc on a tilted plate, and its path to rest."""
+    axes.plot([16, 70, 240, 186, 16], [52, 204, 204, 52, 52], color=INK, **STYLE)
+    t = np.linspace(0, 1, 60)
+    curve(axes, 64 + 120 * t, 120 + 62 * t - 98 * t * t)
+    axes.add_patch(Circle((64, 120), 20, fc=FILL, ec=INK, lw=4.5))
+    axes.add_patch(Circle((184, 84), 7, fc=RED, ec=RED))
+
+
 ICONS: dict[str, Callable[[Axes], None]] = {
-    drawing.__name__: drawing for drawing in (belt, lugre, elastoplastic, sleds, stacked, forced, clutch, joint, servo)
+    drawing.__name__: drawing
+    for drawing in (belt, lugre, elastoplastic, sleds, stacked, forced, clutch, joint, servo, puck)
 }
 
 

@@ -1,4 +1,4 @@
-"""Certified results of the shipped models: those of generation.py, and of event_located.py for fmus/more."""
+"""Certified results of the shipped models: of generation.py, and for fmus/more of event_located.py and plane.py."""
 
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from harness.simulation.solution import Solution
 from .event_located import PROBLEMS, certify_by_two_routes
 from .generation import generate_reference
 from .icon import draw_missing_icon
+from .plane import CLOSED_FORMS
 
 
 def certify_shipped(name: str) -> list[CertifiedFile]:
@@ -38,7 +39,7 @@ def missing_parts(name: str) -> list[str]:
     folder, sentences = model_file(name).parent, []
     if icon := draw_missing_icon(name, folder):
         sentences.append(f"{icon}: drawn from the result; a function of docs/make_icons.py draws a better one")
-    if folder != FOLDER and name not in PROBLEMS:
+    if folder != FOLDER and name not in PROBLEMS and name not in CLOSED_FORMS:
         sentences.append(
             f"{name} has no second formulation, so two methods of its FMU certify it: add one to "
             "benchmarks/references/event_located.py and repeat the command"
@@ -48,6 +49,8 @@ def missing_parts(name: str) -> list[str]:
 
 def generate_all(name: str) -> dict[str, Solution]:
     """Return the references of all laws of a shipped model by their names; none without a second formulation."""
+    if name in CLOSED_FORMS:
+        return {name: CLOSED_FORMS[name]()}
     if name in PROBLEMS:
         return {name: certify_by_two_routes(name)}
     cases = {case.reference_source: case for case in CASES if case.model == name}

@@ -9,15 +9,15 @@ from models import DOP853, scalar_class
 from native_fmus import require_compiler
 from row_comparison import assert_identical
 
-from benchmarks.references import event_located
+from benchmarks.references import event_located, plane
 from fmus.compiler.model_lookup import more_model_names
-from fmus.runtime.variable_declarations import variables
+from fmus.runtime.variable_declarations import exported_name, variables
 from harness.references.certified_reference import event_time_error, load_reference, relative_errors
 
 MORE = ROOT / "fmus" / "more"
 OSCILLATORS = [name for name in more_model_names() if name != "spring"]  # which only couples FMUs
 KINDS = {"python": (), "native": ("--native",), "fmi3": ("--fmi", "3")}
-FMI3 = ("belt", "joint", "lugre", "spring")  # one contact, coupled ones, none, and none that sticks
+FMI3 = ("belt", "joint", "lugre", "spring", "puck")  # one contact, coupled, none, none that sticks, in a plane
 EVERY_KIND = [  # in CI, FMUs of FMI 3.0 are those of FMI3: the C code of a model is that of its native FMU
     pytest.param(name, kind, marks=pytest.mark.campaign if kind == "fmi3" and name not in FMI3 else ())
     for name in more_model_names()
@@ -63,7 +63,7 @@ def mode_names(name):
 
 @pytest.mark.parametrize("name", OSCILLATORS)
 def test_a_model_has_an_icon_and_a_certified_result_from_two_formulations(name):
-    assert name in event_located.PROBLEMS
+    assert name in event_located.PROBLEMS or name in plane.CLOSED_FORMS
     assert MORE.joinpath(f"{name}.png").read_bytes()[:4] == b"\x89PNG"
     assert load_reference(name, MORE).estimated_error < 1e-10
 
@@ -99,6 +99,20 @@ def test_events_are_those_of_the_second_formulation(worker, name):
 
 
 @pytest.mark.slow
+def test_the_puck_rests_when_the_closed_form_says_also_on_a_belt(worker):
+    g, alpha, mu, slip_x, v_y = 9.81, 0.5, 0.6, 1.5, 0.7
+    F, f = g * np.sin(alpha), mu * g * np.cos(alpha)
+    stop, down, across = plane.rest(1.0, F, f, np.hypot(slip_x, v_y), np.arctan2(slip_x, -v_y))
+    for belt in (0.0, -0.8):
+        values = {"alpha": alpha, "mu": mu, "mu_s": mu, "v_belt": belt, "v_x0": slip_x + belt, "v_y0": v_y}
+        fmu = worker.instantiate(built("puck")).begin(values | {"solver.rtol": 1e-10}, stop=2.0)
+        events = follow_events(fmu, ["mode"], 2.0)
+        assert events[-1] == [pytest.approx(stop, abs=1e-9), 0]
+        assert fmu.get("x", "y") == pytest.approx([across + 2.0 * belt, -down], abs=1e-9)
+        fmu.free()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_the_belt_follows_each_law(worker, law):
     number, problem = LAWS[law][0], LAWS[law][1]()
@@ -118,7 +132,7 @@ def test_the_belt_follows_each_law(worker, law):
 def test_native_and_fmi3_agree_with_python_bit_for_bit(worker, name, kind):
     """All outputs at 101 points of the default run."""
     model = scalar_class(name)()
-    names = [variable for variable, declared in variables(model) if declared.causality == "output"]
+    names = [exported_name(*one) for one in variables(model) if one[1].causality == "output"]
     times = np.linspace(0.0, type(model).stop_time, 101).tolist()
     rows = []
     for fmu in (built(name), built(name, kind)):
