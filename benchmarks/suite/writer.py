@@ -1,6 +1,7 @@
 """Writes the suite: a folder for each case, its index cases.json, and check.py.
 
-CASE/fmi2/MODEL.fmu, CASE/fmi3/MODEL.fmu    native FMUs, co-simulation and model exchange
+CASE/fmi2/MODEL.fmu, CASE/fmi3/MODEL.fmu    native FMUs, co-simulation and model exchange; they contain the files below
+                        as related files of the layered standard FMI-LS-REF
 CASE/CASE_ref.opt       start, stop, communication step and tolerance, as in the FMI cross-check
 CASE/CASE_start.csv     start values other than those of the FMU: name, value
 CASE/CASE_in.csv        input, with two rows at a jump; only of some cases
@@ -14,9 +15,13 @@ import json
 import shutil
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from xml.etree.ElementTree import SubElement, fromstring, register_namespace
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 
+from fmus.compiler.text_output import xml_bytes
+from fmus.packaging.certified_result import NAMESPACE, RESULT_FOLDER
 from harness import simulate
 from harness.errors import HarnessError
 from harness.process.subprocess_runner import run_module
@@ -28,6 +33,13 @@ from .cases import SuiteCase, modes_at
 RELATIVE_TOLERANCE = 1e-10  # requested from the solver, of the FMU or of the tool
 OUTPUT_TOLERANCE = 1e-12  # of the run whose outputs are written
 AGREEMENT = 0.1  # of the tolerance of a case, to which the states of this run agree with the certified ones
+ROLES = {  # in FMI-LS-REF, by the ends of the names
+    "ref.opt": ("experiment/validation", "Start, stop, communication step and tolerance"),
+    "start.csv": ("parameter", "Start values other than those of the FMU"),
+    "in.csv": ("experiment/validation", "Input; a time that occurs twice is a jump"),
+    "ref.csv": ("result", "Certified states and mode, and the other outputs"),
+    "events.csv": ("result", "Certified events"),
+}
 
 
 def write_suite(
@@ -65,9 +77,7 @@ def write_suite(
 def write_case(case: SuiteCase, folder: Path, fmus: Path) -> None:
     """Write the files of a case; `fmus` has the folders fmi2 and fmi3."""
     file = f"{case.model}.fmu"
-    for version in ("fmi2", "fmi3"):
-        (folder / version).mkdir(parents=True, exist_ok=True)
-        shutil.copy(fmus / version / file, folder / version)
+    folder.mkdir(parents=True, exist_ok=True)
     solution = case.solve(fmus / "fmi2" / file)
     modes = modes_at(solution, solution.times)
     columns = {"time": solution.times, **dict(zip(case.states, solution.states.T, strict=True))}
@@ -88,6 +98,29 @@ def write_case(case: SuiteCase, folder: Path, fmus: Path) -> None:
     options = {"StartTime": start, "StopTime": stop, "StepSize": step, "RelTol": RELATIVE_TOLERANCE}
     write_rows(folder / f"{case.name}_ref.opt", [], options.items())
     (folder / "README.md").write_text(f"# {case.name}\n\n{case.catches}\n", encoding="utf-8")
+    related = [path for ending in ROLES if (path := folder / f"{case.name}_{ending}").is_file()]
+    for version in ("fmi2", "fmi3"):
+        (folder / version).mkdir(exist_ok=True)
+        embed_files(case, fmus / version / file, folder / version / file, related)
+
+
+def embed_files(case: SuiteCase, source: Path, target: Path, related: Sequence[Path]) -> None:
+    """Copy an FMU, and add the files of a case beside the certified result of its default run."""
+    manifest = f"{RESULT_FOLDER}/fmi-ls-manifest.xml"
+    register_namespace("fmi-ls", NAMESPACE)
+    with ZipFile(source) as old:
+        content = {item: old.read(item) for item in old.infolist() if item.filename != manifest}
+        root = fromstring(old.read(manifest))
+    for path in related:
+        ending = path.name.removeprefix(f"{case.name}_")
+        role, text = ROLES[ending]
+        SubElement(root, "Related", {"source": path.name, "role": role, "type": "text/csv", "description": text})
+    with ZipFile(target, "w", ZIP_DEFLATED) as new:
+        for item, data in content.items():
+            new.writestr(item, data)
+        for path in related:
+            new.write(path, f"{RESULT_FOLDER}/{path.name}")
+        new.writestr(manifest, xml_bytes(root))
 
 
 def other_outputs(case: SuiteCase, fmu: Path, solution: Solution) -> dict[str, np.ndarray]:

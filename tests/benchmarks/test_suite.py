@@ -4,9 +4,11 @@ import json
 import re
 import subprocess
 import sys
+from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import commands
+import fmpy.validation
 import numpy as np
 import pytest
 from native_fmus import require_compiler
@@ -34,6 +36,28 @@ def test_the_archive_of_a_release_has_all_files(suite):
     with ZipFile(f"{suite}.zip") as archive:
         assert {name for name in archive.namelist() if not name.endswith("/")} == files
         assert f"{suite.name}/rest/rest_ref.csv" in files
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
+def test_an_fmu_contains_the_files_of_its_case_and_is_valid(suite, version):
+    fmu = suite / "jump_of_load" / version / "coulomb.fmu"
+    assert fmpy.validation.validate_fmu(fmu) == []
+    with ZipFile(fmu) as archive:
+        names = [name for name in archive.namelist() if name.startswith("extra/org.fmi-standard.fmi-ls-ref/")]
+        contained = {name.rpartition("/")[2]: archive.read(name) for name in names}
+    related = ElementTree.fromstring(contained.pop("fmi-ls-manifest.xml")).findall("Related")
+    assert [item.get("source") for item in related] == list(contained)
+    assert [item.get("role") for item in related] == [
+        "result",  # of the default run
+        "experiment/validation",
+        "parameter",
+        "experiment/validation",
+        "result",
+        "result",
+    ]
+    for name, content in list(contained.items())[1:]:
+        assert content == (suite / "jump_of_load" / name).read_bytes()
 
 
 def verdict(suite, runner, name, tmp_path):
