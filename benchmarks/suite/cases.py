@@ -161,4 +161,9 @@ CASES = (
     SuiteCase("lugre", "lugre", "The LuGre law: a stiff internal state without events."),
     SuiteCase("coupled", "sleds", "Several sleds that pull each other: sticks that end because another sled slips."),
     SuiteCase("stacked", "stacked", "A block on a block: two contacts that act on one body."),
+    SuiteCase(
+        "plane",
+        "puck",
+        "A body turns to the fall of a tilted plate until it stops: friction that acts on each axis alone.",
+    ),
 )

@@ -64,6 +64,8 @@ def run_fmpy(case: CaseFolder, step: float | None = None, **options: object) -> 
 
 def run_model_exchange(case: CaseFolder) -> Columns:
     """Run a case by fmpy's model exchange with CVode."""
+    if read_description(case.fmu).modelExchange is None:
+        raise CannotRunError
     return run_fmpy(case, fmi_type="ModelExchange")
 
 
@@ -91,6 +93,8 @@ def interpolate_across_events(case: CaseFolder) -> Columns:
 def ignore_event_mode(case: CaseFolder) -> Columns:
     """Wrong on purpose: model exchange by Euler's method that enters event mode only at the start."""
     description = read_description(case.fmu)
+    if description.modelExchange is None:
+        raise CannotRunError
     references = {variable.name: variable.valueReference for variable in description.modelVariables}
     model = FMU2Model(
         guid=description.guid,
