@@ -43,6 +43,7 @@ FIGURES_OF_PAGES = {
     "fit": ("tutorials/fit_parameters.md", "results/fit/pulled_block/figure.svg"),
     "sweep": ("tutorials/sweep.md", "results/sweep/map/figure.svg"),
     "squeal": ("tutorials/squeal.md", "results/orbit/belt-v_belt/figure.svg"),
+    "planar": ("how-to/planar.md", "paths.svg"),
     "compare": ("how-to/test_tools.md", "results/compare/coulomb-coulomb-sign/figure.svg"),
 }
 # Figures of commands that pages show but do not run: the command and the path.

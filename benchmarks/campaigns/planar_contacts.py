@@ -16,8 +16,8 @@ from math import cos, hypot, pi, sin
 from pathlib import Path
 from typing import Any
 
+import build_cache
 import numpy as np
-from build_cache import build_once, build_user_model
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -262,9 +262,16 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--scenes", type=int, default=1000)
     parser.add_argument("--driven", type=int, default=200)
     options = parser.parse_args(arguments)
-    puck = build_once("puck-native", "puck", *NATIVE) / "puck.fmu"
+    with temporary_directory() as folder:
+        build_cache.kept_folder = build_cache.shared_folder = Path(folder)
+        return run_campaign(options.scenes, options.driven)
+
+
+def run_campaign(n_closed: int, n_driven: int) -> int:
+    """Run this many motions of each kind; return 1 if one differs or fails."""
+    puck = build_cache.build_once("puck-native", "puck", *NATIVE) / "puck.fmu"
     failures, largest = 0, np.zeros(4)
-    for n, scene in enumerate(random_scenes(options.scenes)):
+    for n, scene in enumerate(random_scenes(n_closed)):
         try:
             errors = errors_at_rest(puck, *scene)
         except harness.HarnessError as error:
@@ -276,12 +283,11 @@ def main(arguments: list[str]) -> int:
             print(f"closed form {n} {scene}: {errors}", flush=True)
             failures += 1
     print("largest errors of time, position, speed and hold:", *(f"{error:.1e}" for error in largest), flush=True)
-    with temporary_directory() as folder:
-        file = Path(folder) / "driven.py"
-        file.write_text(MODEL, encoding="utf-8")
-        driven = next(build_user_model(file, *NATIVE).rglob("driven.fmu"))
+    file = build_cache.kept_folder / "driven.py"
+    file.write_text(MODEL, encoding="utf-8")
+    driven = next(build_cache.build_user_model(file, *NATIVE).rglob("driven.fmu"))
     near_ties = 0
-    for seed in range(options.driven):
+    for seed in range(n_driven):
         motion = random_driven(seed)
         try:
             text = compare(driven, motion)
@@ -294,8 +300,7 @@ def main(arguments: list[str]) -> int:
             print(f"driven {seed}: {text}", flush=True)
             failures += 1
     print(
-        f"{options.scenes} motions to rest and {options.driven} driven ones, of which {near_ties} near a tie: "
-        f"{failures} failures"
+        f"{n_closed} motions to rest and {n_driven} driven ones, of which {near_ties} near a tie: {failures} failures"
     )
     return int(failures > 0)
 

@@ -15,7 +15,9 @@ import pytest
 from build_cache import build_once
 from commands import harness as harness_command
 from commands import run_process
+from native_fmus import require_compiler
 from PIL import Image
+from scipy.integrate import solve_ivp
 
 import harness
 from benchmarks.campaigns.__main__ import CAMPAIGNS
@@ -235,6 +237,42 @@ def test_each_campaign_has_the_same_arguments_everywhere():
             if name in arguments:
                 arguments[name].add(words.split(" --log")[0])
     assert {name: words for name, words in arguments.items() if len(words) > 1} == {}
+
+
+def errors_of_rest(t, x, y):
+    """Return the errors of time and position of the rest of the model puck, by its certified result."""
+    (_, start), (rest, _) = np.loadtxt(ROOT / "fmus" / "more" / "puck-events.csv", delimiter=",", skiprows=1).tolist()
+    certified = np.loadtxt(ROOT / "fmus" / "more" / "puck.csv", delimiter=",", skiprows=2)[-1]
+    assert start == 1.0
+    return abs(t - rest), np.hypot(x - certified[1], y - certified[2])
+
+
+def test_the_errors_of_friction_in_a_plane_on_the_page_are_those_of_runs():
+    require_compiler()
+    fmu = build_once("puck-native", "puck", "--native", "--platform", "linux64") / "puck.fmu"
+    gravity, friction = 9.81 * np.sin(0.4), 0.5 * 9.81 * np.cos(0.4)
+
+    def rates(_, y):
+        size = np.hypot(y[2], y[3])
+        return [y[2], y[3], -friction * y[2] / size, -gravity - friction * y[3] / size]
+
+    def slow(_, y):
+        return np.hypot(y[2], y[3]) - 1e-9
+
+    slow.terminal = True
+    rows = {}
+    for label, rtol in ((", default setting", None), (", `rtol` 1e-10", 1e-10)):
+        run = harness.simulate(fmu, rtol=rtol)
+        rows[f"FMU of `puck`{label}"] = errors_of_rest(run.events.t[-1], run["x"][-1], run["y"][-1])
+    run = solve_ivp(rates, (0.0, 2.5), [0.0, 0.0, 2.0, 1.0], "DOP853", events=slow, rtol=1e-12, atol=1e-14)
+    rows["scipy, DOP853, `rtol` 1e-12"] = errors_of_rest(run.t[-1], *run.y[:2, -1])
+    # each axis by itself: gravity holds at rest, and does not bend the path
+    times = 2.0 / friction, 1.0 / (friction + gravity)
+    rows["a contact for each axis"] = errors_of_rest(max(times), times[0], 0.5 * times[1])
+    page = (DOCS / "explanation" / "accuracy.md").read_text(encoding="utf-8")
+    for name, errors in rows.items():
+        stated = re.search(rf"\| {name} \| (\S+) \| (\S+) \|", page).groups()
+        assert [float(number) for number in stated] == pytest.approx(errors, rel=0.3, abs=1e-12), name
 
 
 def test_the_errors_of_the_magic_formula_on_the_page_are_those_of_default_runs(fmus):
