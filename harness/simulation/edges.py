@@ -8,6 +8,7 @@ import numpy as np
 from ..process.interrupt import check_interrupt
 
 PRECISION, MAX_HALVES = 1e-13, 200  # relative, of the values at edges
+RESOLVED = 1e-6  # relative width of an interval in which a third label is not due to rounding errors
 Label = TypeVar("Label", bound=Hashable)
 
 
@@ -16,7 +17,7 @@ def find_edges(
 ) -> list[tuple[Any, Any, Label, Label]]:
     """Return the edges between numbers or points a and b with labels one and two, as neighbours with their labels.
 
-    Where a third label is between theirs, there are several edges.
+    Where a third label is between theirs, there are several edges, unless they are closer than RESOLVED.
     """
     if one == two:
         return []
@@ -28,7 +29,7 @@ def find_edges(
         found = label(middle)
         if found == one:
             a = middle
-        elif found == two:
+        elif found == two or np.abs(b - a).max() <= RESOLVED * np.abs(b).max():
             b = middle
         else:
             return find_edges(label, a, middle, one, found) + find_edges(label, middle, b, found, two)

@@ -85,8 +85,9 @@ class ReturnMap:
             if end.kind != IRREGULAR:
                 break
             with suppress(NoOrbitError):
-                if self.shoot(end.y, end.period).multiplier < 1.0 - NEUTRAL**0.5:
-                    return end._replace(kind=CYCLE)
+                orbit = self.shoot(end.y, end.period)
+                if orbit.multiplier < 1.0 - NEUTRAL**0.5:
+                    return Ending(CYCLE, orbit.y, orbit.period, orbit.n_sticks)
         return end
 
     def follow_returns(self, y: np.ndarray, count: int) -> Ending:

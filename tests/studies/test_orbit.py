@@ -289,6 +289,34 @@ def test_a_forced_oscillator_without_stops_has_the_amplitude_of_den_hartog():
     assert 5.0 < point.value < 7.0
 
 
+STOPS = {
+    0: (7, 2),
+    2: (3, 2),
+    4: (0.7, 1),
+    6: (0.7, 3),
+    8: (0.7, 5),
+    10: (0.4, 3),
+    12: (0.4, 4),
+    14: (0.25, 3),
+}
+
+
+@pytest.mark.slow
+def test_a_forced_mass_has_the_counts_of_stops_of_hong_and_liu():
+    """H.-K. Hong, C.-S. Liu, Journal of Sound and Vibration 229 (2000) 1171-1192, name these counts, and 1."""
+    for stops, (frequency, friction) in STOPS.items():
+        result = harness.orbit(native("forced"), {"Omega": frequency, "f": friction})
+        assert [(orbit.n_sticks, orbit.stability) for orbit in result.motions] == [(stops, "stable")]
+
+
+@pytest.mark.slow
+def test_an_edge_between_counts_of_stops_is_one_point():
+    """Near it the count is a matter of rounding errors."""
+    result = harness.map_motions(native("forced"), {"Omega": [0.6, 0.68]}, {"f": 2.0})
+    (edge,) = result.edges
+    assert (edge.below, edge.above) == ("6 sticks in a period", "4 sticks in a period")
+
+
 def test_a_motion_that_does_not_repeat_is_named_and_not_drawn():
     """A force on a spring without friction: two frequencies that never meet."""
     result = harness.orbit(native("forced"), {"f": 0.0, "Omega": 3.1})
