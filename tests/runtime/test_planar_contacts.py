@@ -41,6 +41,9 @@ class {name}(Model):
 {belt}    R = PlanarContact("N", "friction", mode=mode, slip={slip}, slide=f, hold=f_s)
     a_x = Output("m/s2", "acceleration along x", ({load_x} - R.x) / m, rate_of=v_x)
     a_y = Output("m/s2", "acceleration along y", ({load_y} - R.y) / {mass}, rate_of=v_y)
+    speed = Output("m/s", "speed of the slip", R.speed)
+    e_x = Output("1", "direction of the slip along x", R.direction[0])
+    e_y = Output("1", "direction of the slip along y", R.direction[1])
 {more}    stop_time, step_size, method = 2.0, 0.01, "radau9"
 '''
 # force, direction of the motion from that of the force; friction 2 N, mass 1 kg, speed 1 m/s
@@ -113,17 +116,41 @@ def test_body_passes_zero_speed_nearly_head_on(puck, offset):
     assert run["y"][-1] == pytest.approx(offset / 7.0, rel=1e-4, abs=1e-12)
 
 
-def test_quarter_turn_of_the_plane_changes_no_bit(puck):
-    runs = [
+def test_speed_and_direction_are_those_of_the_slip_and_at_rest_of_the_load(puck):
+    run = harness.simulate(puck, {"v_x0": 0.6, "v_y0": -0.8}, stop=1.0, inputs=constant(0.3, 0.4, 1.0))
+    assert run["mode"][-1] == 0
+    moves = run["mode"] == 1
+    assert run["speed"] == pytest.approx(np.hypot(run["v_x"], run["v_y"]))
+    assert run["e_x"][moves] == pytest.approx(run["v_x"][moves] / run["speed"][moves])
+    assert (run["e_x"][-1], run["e_y"][-1]) == pytest.approx((0.6, 0.8))
+    assert [harness.simulate(puck, stop=0.1)[name][-1] for name in ("speed", "e_x", "e_y")] == [0.0, 0.0, 0.0]
+
+
+def quarter_turns(puck, method):
+    """Return the runs of a motion and of the same one after a quarter turn of the plane."""
+    scenes = (1.0, 0.3, (5.0, -2.0)), (-0.3, 1.0, (2.0, 5.0))
+    return [
         harness.simulate(
-            puck, {"k": 40.0, "v_x0": v_x, "v_y0": v_y}, stop=3.0, inputs=constant(*force, 3.0), method="dop853"
+            puck, {"k": 40.0, "v_x0": v_x, "v_y0": v_y}, stop=3.0, inputs=constant(*force, 3.0), method=method
         )
-        for v_x, v_y, force in ((1.0, 0.3, (5.0, -2.0)), (-0.3, 1.0, (2.0, 5.0)))
+        for v_x, v_y, force in scenes
     ]
-    assert runs[0].events.t.tolist() == runs[1].events.t.tolist()
-    assert len(runs[0].events.t) > 1
-    assert runs[0]["x"].tolist() == runs[1]["y"].tolist()
-    assert runs[0]["y"].tolist() == (-runs[1]["x"]).tolist()
+
+
+@pytest.mark.parametrize("method", slow_after(1, ("dop853", "ode23", "ode45")))
+def test_quarter_turn_of_the_plane_changes_no_bit(puck, method):
+    run, turned = quarter_turns(puck, method)
+    assert run.events.t.tolist() == turned.events.t.tolist()
+    assert len(run.events.t) > 1
+    assert run["x"].tolist() == turned["y"].tolist()
+    assert run["y"].tolist() == (-turned["x"]).tolist()
+
+
+@pytest.mark.parametrize("method", ["radau9", "rodas"])
+def test_quarter_turn_of_the_plane_changes_linear_solutions_within_the_tolerance(puck, method):
+    run, turned = quarter_turns(puck, method)
+    assert run.events.t == pytest.approx(turned.events.t, abs=1e-7)
+    assert (run["x"][-1], run["y"][-1]) == pytest.approx((turned["y"][-1], -turned["x"][-1]), abs=1e-7)
 
 
 @pytest.mark.slow

@@ -358,7 +358,8 @@ class PlanarContact(Contact):
         a_y = Output("m/s2", "acceleration along y", (F_y - R.y) / m, rate_of=v_y)
 
     `R` is the size of the force, and `R.x` and `R.y` are its components, which oppose the slip: they are outputs of the
-    FMU as well.  `R.speed` is the size of the slip.
+    FMU as well.  `R.speed` is the size of the slip, and `R.direction` the pair of components of its direction; at rest,
+    those of the direction of the load.
 
     Parameters
     ----------
@@ -398,6 +399,10 @@ class PlanarContact(Contact):
         # the analysis of the contacts sets their expressions
         self.x, self.y = (Output(unit, f"{text}, component along {axis}", 0.0) for axis in ("x", "y"))
         self.own_variables = (("_x", ".x", self.x), ("_y", ".y", self.y))
+        self.direction = (
+            Term("slip_direction", x, y, self.x, self.y),
+            Term("slip_direction", y, x, self.y, self.x),
+        )
 
     @property
     def components(self) -> tuple[Output, Output]:
