@@ -19,6 +19,7 @@ CAMPAIGNS = {  # name -> command, after the path of Python
     "low_speed_friction": ("-m", "benchmarks.campaigns.low_speed_friction", "4"),
     "curve_coverage": ("-m", "benchmarks.campaigns.curve_coverage", "900"),
     "hidden_defects": ("-m", "benchmarks.campaigns.hidden_defects", "60"),
+    "orbit_campaign": ("-m", "benchmarks.campaigns.orbit_campaign", "200", "64"),
     "decay_times": ("-m", "benchmarks.campaigns.decay_times"),
 }
 FOLDER = Path("results/campaigns")
