@@ -47,8 +47,9 @@ def split_axis(text: str) -> tuple[str, list[float]]:
     try:
         ends = float(low), float(high)
         steps = int(count) - 1 if count else 1
-        if not (name.strip() and ends[0] < ends[1] and steps >= 1):
+        if not (name.strip() and ends[0] < ends[1] and steps >= 1 + bool(count)):  # two values are ends
             raise ValueError
     except ValueError:
-        raise SceneError(f"--over {text[:MAX_VALUE_LENGTH]} is invalid; write it as in v_belt=0.1:3:60") from None
+        hint = "write it as in v_belt=0.1:3 or, for 3 values or more, v_belt=0.1:3:60"
+        raise SceneError(f"--over {text[:MAX_VALUE_LENGTH]} is invalid; {hint}") from None
     return name.strip(), [ends[0] + (ends[1] - ends[0]) * i / steps for i in range(steps)] + [ends[1]]

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import HarnessError, SceneError, format_value
 from ..process.subprocess_runner import SubprocessTimeoutError, run_module
 from ..process.temporary_directory import temporary_directory
-from ..scenes.fmu_files import FOLDERS, check_built
+from ..scenes.fmu_files import FOLDERS, MORE, check_built
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import PROCESS_RESOURCES, default_stop, is_python_fmu, read_description, unpack_once
 from .fmu_variables import LAW
@@ -37,7 +37,7 @@ def native_equivalent(fmu: Path) -> Path:
     native_fmu = fmu.parent / "native" / fmu.name
     if native_fmu.is_file() and is_same_model(fmu, native_fmu):
         return native_fmu
-    candidates = (fmu.with_suffix(".py"), *(folder / f"{fmu.stem}.py" for folder in FOLDERS))
+    candidates = (fmu.with_suffix(".py"), *(folder / f"{fmu.stem}.py" for folder in (*FOLDERS, *MORE)))
     source = next(filter(Path.is_file, candidates), None)
     if source is None:
         return fmu
