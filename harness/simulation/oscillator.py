@@ -364,7 +364,7 @@ class Oscillator:
             if not point.sticks and np.abs(self.reduce(point.f)).max() <= 1e-10 * scale:
                 steady = SteadySliding(y, np.linalg.eigvals(matrix))
                 self.begin(y)
-                if not self.step(0.0, 1.0 / float(np.abs(steady.eigenvalues).max())).n_changes:
+                if not self.step(0.0, min(STOP, 1.0 / float(np.abs(steady.eigenvalues).max()))).n_changes:
                     # it slides on, with a speed that is not zero by rounding
                     self.last_equilibrium = y  # a good guess at the next point
                     return steady

@@ -271,12 +271,11 @@ class ReturnMap:
             low, high = (low, middle) if reverses(middle) else (middle, high)
         self.reversal = high
         for _ in range(MAX_ITERATIONS):
-            end = oscillator.begin(y + high * oscillator.speeds)
-            begin = oscillator.begin(y + low * oscillator.speeds)
+            points = [oscillator.begin(y + change * oscillator.speeds) for change in (low, high)]
             slope = float(oscillator.speeds @ oscillator.read_jacobian() @ oscillator.displacement)
-            rates = [float(oscillator.speeds @ point.f) for point in (begin, end)]
-            if end.sticks or rates[0] * high > 0.0 > rates[1] * high:
-                return end.y
+            rates = [float(oscillator.speeds @ point.f) for point in points]
+            if rates[0] * high > 0.0 > rates[1] * high or any(point.sticks for point in points):
+                return next((point.y for point in points if point.sticks), points[1].y)
             if not slope:
                 break
             y = y - 0.5 * sum(rates) / slope * oscillator.displacement
@@ -296,7 +295,7 @@ class ReturnMap:
                 released = point.t
             if point.t > released and self.is_maximum(last, point):
                 return last, point
-            if point.t - MAX_TURNS * steady.turn_time > released or (released == inf and point.n_changes > 1):
+            if not point.sticks and point.t > MAX_TURNS * steady.turn_time + (0.0 if released == inf else released):
                 return None
             last = point
         return None

@@ -209,6 +209,15 @@ def test_orbits_of_all_amplitudes_are_named_and_not_drawn(name, values, largest)
     assert 0.7 * largest < float(result.remarks[0].split("at least ")[1].split()[0]) < largest
 
 
+def test_limits_without_a_spring_or_a_fall_of_friction_are_no_errors():
+    """Without a spring the body rides along; with constant friction it leaves the belt without a jump of its rate."""
+    kinds = [item.kind for item in harness.orbit(native("belt"), {"k": 0.0, "v_belt": 1.0}).motions]
+    assert kinds == [STEADY, "rest"]
+    result = harness.orbit(native("belt"), {"delta": 0.0, "v_belt": 1.0})
+    assert {item.stability for item in result.motions} == {"neutral"}
+    assert "orbits of all amplitudes" in result.remarks[0]
+
+
 C, STATIC, DELTA = 0.1, 1.0, 3.0  # of the belt of Leine and others, with a damper
 
 
