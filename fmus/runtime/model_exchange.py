@@ -35,7 +35,8 @@ from .vectors import (
 )
 
 OVERSHOOT_TOLERANCE = 0.1  # slip velocities of the wrong sign up to this share of their terms are overshoot
-INDICATOR_OFFSET, TINY = 4.0 * EPSILON, 1e-300  # offset relative to the limit; absolute offset of velocities and forces
+INDICATOR_OFFSET = 4.0 * EPSILON  # relative to the limit, or to the terms of a slip
+TINY = 1e-300  # absolute offset of velocities and forces
 DEFAULT_NOMINAL = 1e-3  # nominal position (m, rad) and velocity (m/s, rad/s) by default
 DEFAULT_TOLERANCE = 1e-4  # relative tolerance if the importer gives none
 
@@ -190,6 +191,7 @@ def update_indicators(run, model):
     if solver.step.is_hybrid:
         if model.is_coupled:
             slips = model.slip_velocities(solver.t, solver.y)
+            sizes = model.slip_magnitudes(solver.t, solver.y)
             force, limit, _sizes, terms = model.contact_forces(solver.t, solver.y, solver.modes)
             if model.has_prescribed_slips and run.phase != EVENT:
                 for i in contact_indices:
@@ -197,7 +199,8 @@ def update_indicators(run, model):
             for i in contact_indices:
                 if solver.modes[i] != STUCK:
                     if not (force[i] == 0.0 and limit[i] == 0.0):  # without friction, a reversal is no event
-                        to_rest[i] = solver.modes[i] * slips[i] + TINY
+                        # after an event the slip is zero but for rounding errors, of either sign
+                        to_rest[i] = solver.modes[i] * slips[i] + INDICATOR_OFFSET * sizes[i] + TINY
                 else:
                     slack = ROUNDOFF_MARGIN * terms[i]
                     to_break_away[i] = limit[i] + slack + INDICATOR_OFFSET * limit[i] + TINY - fabs(force[i])

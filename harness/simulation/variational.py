@@ -399,7 +399,8 @@ class VariationalRun:
             elif status == EVENT or target < end:
                 self.handle_event(int(run.indicator) if status == EVENT else -1, status == REACHED and target == row)
                 row = self.set_table(run.t) if run.t >= row else row
-            n_at_once, last_t = (n_at_once + 1, last_t) if run.t == last_t else (0, run.t)
+            is_at_once = run.t - last_t <= NEAR * (self.stop - self.start)
+            n_at_once, last_t = (n_at_once + 1, last_t) if is_at_once else (0, run.t)
             if n_at_once > MAX_EVENTS:
                 raise self.failure(f"{MAX_EVENTS} events at t = {run.t:.9g} s")
         return self.make_solution()

@@ -246,7 +246,7 @@ def test_touches_and_ties_are_reported(pair, values, parameters, at, reason):
 
 @pytest.mark.parametrize(
     "seed",
-    [pytest.param(n, marks=pytest.mark.slow if n in (3, 8) else pytest.mark.campaign) for n in range(30)],
+    [pytest.param(n, marks=pytest.mark.slow if n in (3, 8, 10) else pytest.mark.campaign) for n in range(30)],
 )
 def test_derivatives_of_random_models_are_those_of_differences(seed, tmp_path):
     """Up to three bodies and contacts, with belts, drivers, limited loads and falling friction.
@@ -259,7 +259,11 @@ def test_derivatives_of_random_models_are_those_of_differences(seed, tmp_path):
     fmu = build_user_model(path, "--native", "--platform", "linux64") / "native" / f"{structure.name}.fmu"
     variables, times = {item.name for item in harness.describe(fmu).variables}, np.linspace(0.0, STOP, 9)[1:] * 0.983
     values = {name: value for name, value in random_values(structure, 0)[0].items() if name in variables}
-    parameters = [name for name, value in values.items() if isinstance(value, float) and value]
+    equal = [name for name, value in values.items() if value == values.get(name.replace("_d", "_s")) and "_d" in name]
+    without_neighbours = {*equal, *(name.replace("_d", "_s") for name in equal)}  # the FMU refuses one side
+    parameters = [
+        name for name, value in values.items() if isinstance(value, float) and value and name not in without_neighbours
+    ]
     s = harness.sensitivity(fmu, parameters, values, times=times, rtol=1e-12)
     outputs = list(s.outputs)
     largest = np.abs(s.values).max(axis=0)
