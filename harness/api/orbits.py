@@ -5,7 +5,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..arguments import INCREASING_ROW, PATH, PROGRESS, SETTINGS, TEXT, WORKERS, Progress, check_arguments, mapping
+from ..arguments import (
+    INCREASING_ROW,
+    PATH,
+    POSITIVE,
+    PROGRESS,
+    SETTINGS,
+    TEXT,
+    WORKERS,
+    Progress,
+    check_arguments,
+    mapping,
+)
 from ..errors import SceneError
 from .options import check_workers, reporter, with_progress_bar
 
@@ -21,13 +32,14 @@ OVER = mapping(INCREASING_ROW, "rows of increasing numbers")
 DEFAULT_VALUES, DEFAULT_GRID = 61, 21  # values of a parameter of which only the ends are given: orbit, map
 
 
-@check_arguments(source=PATH, values=SETTINGS, over=OVER, progress=PROGRESS)
+@check_arguments(source=PATH, values=SETTINGS, over=OVER, period=POSITIVE, progress=PROGRESS)
 @with_progress_bar
 def orbit(
     source: "str | Path",
     values: Mapping[str, float | str] | None = None,
     *,
     over: "Mapping[str, ArrayLike] | None" = None,
+    period: float | None = None,
     progress: Progress | bool | None = None,
 ) -> "OrbitResult":
     """Find the steady sliding and the periodic motions of a model, stable and unstable ones, over a parameter.
@@ -45,6 +57,9 @@ def orbit(
         Parameters and start values by name, in the units of the FMU; enumerations by label or number.
     over : mapping, optional
         A parameter and its increasing values (n,); its two ends for 61 values.
+    period : float, optional
+        Period in s of forces that depend on a clock, a state in s with a constant rate. That of a phase angle, a state
+        in rad with a constant rate, is known.
     progress : callable or False, optional
         Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
         switches it off.
@@ -70,7 +85,7 @@ def orbit(
 
     axes = {} if over is None else expand_axes(over, DEFAULT_VALUES, 1)
     name, row = next(iter(axes.items()), ("", ()))
-    return compute_orbits(resolve_motion(source, values), name, [*map(float, row)], reporter(progress))
+    return compute_orbits(resolve_motion(source, values), name, [*map(float, row)], period, reporter(progress))
 
 
 @check_arguments(source=PATH, over=OVER, values=SETTINGS, workers=WORKERS, scheduler=TEXT, progress=PROGRESS)

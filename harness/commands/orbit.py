@@ -4,16 +4,18 @@ from functools import partial
 
 import click
 
+from ..arguments import POSITIVE
 from ..errors import MAX_VALUE_LENGTH, SceneError
-from .terminal import SET_OPTION, SectionedCommand, Terminal, result_options
+from .terminal import SET_OPTION, RuleType, SectionedCommand, Terminal, result_options
 
 
 @click.command(cls=SectionedCommand)
 @click.argument("source", metavar="MODEL|SCENE|FMU")
 @SET_OPTION
 @click.option("--over", metavar="NAME=LO:HI[:N]", help="Parameter that varies, with its ends and 61 or N values.")
+@click.option("--period", type=RuleType(POSITIVE), help="Period in s of forces that depend on a clock, a state in s.")
 @result_options
-def orbit(source: str, values: tuple[str, ...], over: str | None, terminal: Terminal) -> None:
+def orbit(source: str, values: tuple[str, ...], over: str | None, period: float | None, terminal: Terminal) -> None:
     """Print the steady sliding and the periodic motions of a model, and over a parameter the points where they change.
 
     Stable and unstable motions are found, with their Floquet multipliers.  Over a parameter, the points are located at
@@ -33,7 +35,7 @@ def orbit(source: str, values: tuple[str, ...], over: str | None, terminal: Term
 
     settings, axis = parse_assignments("--set", values), None if over is None else dict([split_axis(over)])
     with terminal.progress(1) as report:
-        compute = partial(find_orbits, source, settings, over=axis, progress=partial(report, source))
+        compute = partial(find_orbits, source, settings, over=axis, period=period, progress=partial(report, source))
         folder = terminal.out / "orbit" / "-".join([resolve(source).model, *(axis or {})])
         result = save_result(folder, compute, "orbit", describe_sources(source))
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

@@ -74,10 +74,10 @@ class SteadySliding(NamedTuple):
 
 
 @contextmanager
-def open_oscillator(spec: RunSpec, varied: Sequence[str] = ()) -> "Iterator[Oscillator]":
+def open_oscillator(spec: RunSpec, varied: Sequence[str] = (), period: float | None = None) -> "Iterator[Oscillator]":
     """Open an oscillator; its parameters are those of `Oscillator`."""
     with ExitStack() as resources:
-        yield Oscillator(spec, varied, resources)
+        yield Oscillator(spec, varied, period, resources)
 
 
 class Oscillator:
@@ -89,6 +89,8 @@ class Oscillator:
         Native FMU with directional derivatives, and values.
     varied : sequence of str
         Parameters that `set_point` changes.
+    period : float or None
+        Period in s of forces that depend on a clock.
     resources : contextlib.ExitStack
         Closes the instances.
 
@@ -101,7 +103,9 @@ class Oscillator:
     basis : numpy.ndarray
         The coordinates that repeat (n, r), B above.
     phase : int or None
-        Index of the state that is the phase angle of a force.
+        Index of the state that is the phase angle of a force, or its clock.
+    sets_phase : bool
+        Whether a parameter sets this state at the start.
     coordinate : int
         Index of the state that measures a motion.
     gauge : numpy.ndarray
@@ -123,8 +127,8 @@ class Oscillator:
         If its friction law has no events, or its states cannot be set.
     """
 
-    def __init__(self, spec: RunSpec, varied: Sequence[str], resources: ExitStack) -> None:
-        self.resources, self.varied, self.n_runs = resources, tuple(varied), 0
+    def __init__(self, spec: RunSpec, varied: Sequence[str], period: float | None, resources: ExitStack) -> None:
+        self.resources, self.varied, self.period, self.n_runs = resources, tuple(varied), period, 0
         description, self.folder = read_description(spec.fmu), unpack_once(spec.fmu)
         self.variables = {variable.name: variable for variable in description.modelVariables}
         self.parameters = [
@@ -280,11 +284,18 @@ class Oscillator:
         points = (point for y in states for point in islice(self.follow(y), 0, SAMPLED * 10, 10) if not point.sticks)
         jacobians = np.array([self.read_jacobian() for _ in points])
         is_constant = ~jacobians.any(axis=(0, 2))
-        is_angle = np.array([self.units[state] == "rad" for state in self.states])
-        phases = np.flatnonzero(is_constant & is_angle & (rates != 0.0) & jacobians.any(axis=(0, 1)))
+        is_clock = is_constant & (rates != 0.0) & jacobians.any(axis=(0, 1))
+        units = np.array([self.units[state] for state in self.states])
+        if self.period is None and (is_clock & (units == "s")).any():
+            clock = self.states[int(np.argmax(is_clock & (units == "s")))]
+            raise HarnessError(f"{name} has forces that depend on the time {clock}: give their period in s")
+        phases = np.flatnonzero(is_clock & (units == ("rad" if self.period is None else "s")))
+        if self.period is not None and not len(phases):
+            raise HarnessError(f"{name} has no forces that depend on a time: remove the period")
         self.phase = int(phases[0]) if len(phases) else None
         if self.phase is not None and not self.matrix[self.phase].any():
             self.find_phase_parameter(self.phase, states[0])
+        self.sets_phase = self.phase is not None and bool(self.matrix[self.phase].any())
         kept = [i for i in range(n) if i != self.phase]
         _, sizes, rows = np.linalg.svd(np.concatenate(jacobians)[:, kept])
         rank = int(np.count_nonzero(sizes > 1e-10 * sizes[0]))
@@ -297,7 +308,7 @@ class Oscillator:
         row = self.basis[self.coordinate]
         self.gauge = self.basis @ row / (row @ row)
         self.displacement = self.gauge / (self.gauge @ self.gauge)
-        set_by = np.column_stack([self.basis, np.eye(n)[:, phases[:1]]])
+        set_by = np.column_stack([self.basis, np.eye(n)[:, phases[: int(self.sets_phase)]]])
         reduced = set_by.T @ self.matrix
         self.inverse = np.linalg.pinv(reduced) @ set_by.T  # translations stay as they are at the start
         for state, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
@@ -329,7 +340,9 @@ class Oscillator:
     @property
     def forced_period(self) -> float | None:
         """Return the period of the force in s; None without a force."""
-        return None if self.phase is None else 2.0 * pi / abs(float(self.begin(self.start).f[self.phase]))
+        if self.phase is None or self.period is not None:
+            return self.period
+        return 2.0 * pi / abs(float(self.begin(self.start).f[self.phase]))
 
     def reduce(self, y: np.ndarray) -> np.ndarray:
         """Return the coordinates (r,) of states or rates."""

@@ -123,7 +123,10 @@ class ReturnMap:
         return Ending(REST, path[-1].y)
 
     def describe_cycle(self, path: list[Point]) -> Ending:
-        """Return the cycle that a motion has gone through, with the middle of its longest slip."""
+        """Return the cycle that a motion has gone through, with the middle of its longest slip.
+
+        If the phase of a force is always the same at the start, it is the begin of its period instead.
+        """
         slips, n_sticks = list[list[Point]](), 0
         for last, point in zip([path[0], *path], path, strict=False):
             if not point.sticks:
@@ -135,7 +138,8 @@ class ReturnMap:
             return Ending(REST, path[-1].y)
         longest = max(slips, key=lambda slip: slip[-1].t - slip[0].t)
         middle = min(longest, key=lambda point: abs(2.0 * point.t - longest[0].t - longest[-1].t))
-        return Ending(CYCLE, middle.y, path[-1].t - path[0].t, n_sticks)
+        point = path[0] if self.oscillator.phase is not None and not self.oscillator.sets_phase else middle
+        return Ending(CYCLE, point.y, path[-1].t - path[0].t, n_sticks)
 
     def distance(self, one: np.ndarray, two: np.ndarray) -> float:
         """Return the largest difference of the coordinates of two states."""

@@ -279,6 +279,53 @@ def test_a_sled_without_damping_has_the_closed_form_of_stick_slip():
     assert np.abs(orbit.multipliers).max() < 1e-9
 
 
+CLOCKED = '''
+from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State, cos
+
+
+class Clocked(Model):
+    """The forced mass, with a force of a clock or of an angle that always start at zero."""
+
+    m = Parameter(1.0, "kg", "mass")
+    k = Parameter(100.0, "N/m", "stiffness")
+    f = Parameter(6.0, "N", "friction")
+    P = Parameter(10.0, "N", "amplitude of the force")
+    Omega = Parameter(7.0, "rad/s", "angular frequency of the force")
+    x0 = Fixed(0.0, "m", "initial position")
+    v0 = Fixed(0.0, "m/s", "initial speed")
+    x = State("m", "position", start=x0)
+    v = State("m/s", "speed", start=v0, rate_of=x)
+    clock = State(UNIT, "time, or phase angle", rate=RATE)
+    mode = Mode()
+    F = Contact("N", "friction", mode=mode, slip=v, slide=f)
+    a = Output("m/s2", "acceleration", (P * cos(ANGLE) - k * x - F) / m, rate_of=v)
+'''
+
+
+@pytest.mark.parametrize(
+    ("unit", "rate", "angle", "options"),
+    [
+        ("s", "1.0", "Omega * clock", {"period": 2 * pi / 7.0}),
+        pytest.param("rad", "Omega", "clock", {}, marks=pytest.mark.slow),
+    ],
+)
+def test_a_force_by_a_clock_has_the_amplitude_of_den_hartog(unit, rate, angle, options, tmp_path):
+    require_compiler()
+    text = CLOCKED.replace("UNIT", repr(unit)).replace("RATE", rate).replace("ANGLE", angle)
+    (tmp_path / "clocked.py").write_text(text, encoding="utf-8")
+    fmu = build_user_model(tmp_path / "clocked.py", "--native", "--platform", "linux64") / "native" / "clocked.fmu"
+    (orbit,) = harness.orbit(fmu, **options).motions
+    assert orbit.amplitude == pytest.approx(hartog(7.0), rel=1e-10)
+    (twin,) = harness.orbit(native("forced"), {"Omega": 7.0}).motions
+    np.testing.assert_allclose(np.sort(np.abs(orbit.multipliers)), np.sort(np.abs(twin.multipliers)), rtol=1e-6)
+    (stops,) = harness.orbit(fmu, {"f": 8.5}, **options).motions
+    (twin,) = harness.orbit(native("forced"), {"Omega": 7.0, "f": 8.5}).motions
+    assert (stops.n_sticks, stops.stick_time) == (twin.n_sticks, pytest.approx(twin.stick_time, rel=1e-7))
+    if options:
+        with pytest.raises(harness.HarnessError, match="depend on the time clock: give their period in s"):
+            harness.orbit(fmu)
+
+
 def hartog(frequency, m=1.0, k=100.0, force=10.0, friction=6.0):
     """Return the amplitude without stops of Den Hartog's oscillator."""
     r = frequency / sqrt(k / m)

@@ -34,9 +34,9 @@ def plot_map(axes: Axes, result: "MapResult") -> None:
 
 
 def join_points(points: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Return points (n, 2) in the order of a walk to the nearest one; a row of NaN where that one is far."""
+    """Return points (n, 2) in the order of a walk from an end to the nearest one; a row of NaN where that is far."""
     scaled = points / np.where(ranges > 0.0, ranges, 1.0)
-    left, order = {*range(len(points))}, [int(np.argmin(scaled.sum(axis=1)))]
+    left, order = {*range(len(points))}, [int(np.argmax(np.hypot(*(scaled - scaled.mean(axis=0)).T)))]
     left.remove(order[0])
     walk = [points[order[0]]]
     while left:

@@ -202,6 +202,7 @@ def compute_orbits(
     spec: RunSpec,
     parameter: str = "",
     values: Sequence[float] = (),
+    period: float | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> OrbitResult:
     """Find the periodic motions of an FMU, at one point or over a parameter.
@@ -214,6 +215,8 @@ def compute_orbits(
         Parameter that varies; empty for none.
     values : sequence of float
         Its increasing values.
+    period : float or None
+        Period in s of forces that depend on a clock.
     report : callable
         Receives the progress from 0 to 1.
 
@@ -225,7 +228,7 @@ def compute_orbits(
         If the FMU is not suitable.
     """
     run = replace(spec, fmu=native_with_derivatives(spec.fmu))
-    with open_oscillator(run, (parameter,) if parameter else ()) as oscillator:
+    with open_oscillator(run, (parameter,) if parameter else (), period) as oscillator:
         tracer, motions, points = BranchTracer(oscillator), list[list[Motion]](), list[SpecialPoint]()
         for number, value in enumerate(values or (nan,)):
             seeds = [motion.y for motion in (motions[-1] if motions else ()) if motion.kind != STEADY]
