@@ -103,7 +103,7 @@ def test_the_puck_rests_when_the_closed_form_says_also_on_a_belt(worker):
     g, alpha, mu, slip_x, v_y = 9.81, 0.5, 0.6, 1.5, 0.7
     F, f = g * np.sin(alpha), mu * g * np.cos(alpha)
     stop, down, across = plane.rest(1.0, F, f, np.hypot(slip_x, v_y), np.arctan2(slip_x, -v_y))
-    for belt in (0.0, -0.8):
+    for belt in (0.0, 0.171, -0.8):
         values = {"alpha": alpha, "mu": mu, "mu_s": mu, "v_belt": belt, "v_x0": slip_x + belt, "v_y0": v_y}
         fmu = worker.instantiate(built("puck")).begin(values | {"solver.rtol": 1e-10}, stop=2.0)
         events = follow_events(fmu, ["mode"], 2.0)

@@ -17,6 +17,9 @@ from variants import slow_after
 
 import harness
 from benchmarks.campaigns.planar_contacts import constant, errors_at_rest, random_scenes
+from fmus.compiler.lowering import select_features
+from fmus.compiler.lowering.lowered_modules import lowered_texts
+from fmus.compiler.model_lookup import find_model
 
 NATIVE = ("--native", "--platform", "linux64")
 PUCK = '''from fmus import Contact, cos, Fixed, Input, Mode, Model, Output, Parameter, PlanarContact, State
@@ -153,6 +156,15 @@ def test_quarter_turn_of_the_plane_changes_linear_solutions_within_the_tolerance
     assert (run["x"][-1], run["y"][-1]) == pytest.approx((turned["y"][-1], -turned["x"][-1]), abs=1e-7)
 
 
+@pytest.mark.parametrize("v_belt", [0.171, 3.3, 1000.0])
+def test_body_rests_on_a_belt_as_on_a_plate(shipped, v_belt):
+    plate = harness.simulate(shipped, rtol=1e-8)
+    belt = harness.simulate(shipped, {"v_belt": v_belt, "v_x0": 2.0 + v_belt}, rtol=1e-8)
+    assert belt.events.t == pytest.approx(plate.events.t, abs=1e-7)
+    assert belt["x"][-1] - 2.5 * v_belt == pytest.approx(plate["x"][-1], abs=1e-7)
+    assert (belt["v_x"][-1], belt["v_y"][-1]) == (v_belt, 0.0)
+
+
 @pytest.mark.slow
 def test_body_on_a_belt_moves_as_on_a_table_that_stands_still(puck, build):
     belt = '    v_b = Input(0.0, "m/s", "speed of the belt", rate=0.0)\n'
@@ -284,3 +296,9 @@ def test_directional_derivatives_are_those_of_the_formulas(puck):
         fmu.terminate()
         fmu.freeInstance()
     rmtree(folder)
+
+
+def test_models_without_contacts_in_a_plane_carry_no_line_of_them():
+    source = find_model("sleds")
+    texts = lowered_texts(source, select_features(source))
+    assert not [path for path, text in texts.items() if "planar" in text or "end_at_rest" in text]

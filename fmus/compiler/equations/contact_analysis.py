@@ -135,13 +135,16 @@ class ContactAnalysis(ModelRoles):
             else build_term("/", substitute(rate, {force: 0.0}), inverse_mass)
             for rate, force in zip(rates, c.components, strict=True)
         ]
-        (x, y), (load_x, load_y), total = c.slips, loads, 0.0
+        (x, y), (load_x, load_y), total, held = c.slips, loads, 0.0, 0.0
         is_stuck = Term("==", c.mode, 0)
         for force, *pair in (c.x, x, y, load_x, load_y), (c.y, y, x, load_y, load_x):
             direction = Term("slip_direction", *pair)
             force.expression = Term("choose", is_stuck, pair[2], build_term("*", c.slide, direction))
             total = build_term("+", total, build_term("*", pair[2], direction))
-        self.load[c], self.A[c, c] = total, inverse_mass
+            # at rest, on a belt, the slip has rounding errors
+            of_load = Term("slip_direction", 0.0, 0.0, *pair[2:])
+            held = build_term("+", held, build_term("*", pair[2], of_load))
+        self.load[c], self.A[c, c] = held, inverse_mass
         self.slip_rate[c] = build_term("*", inverse_mass, build_term("-", total, c))
         self.planar_rates[c] = [substitute(rate, dict.fromkeys(c.components, 0.0)) for rate in rates]
 
