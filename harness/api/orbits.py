@@ -19,6 +19,7 @@ from ..arguments import (
 )
 from ..errors import SceneError
 from .options import check_workers, reporter, with_progress_bar
+from .runs import read_input_columns
 
 if TYPE_CHECKING:
     import numpy as np
@@ -39,6 +40,7 @@ def orbit(
     values: Mapping[str, float | str] | None = None,
     *,
     over: "Mapping[str, ArrayLike] | None" = None,
+    inputs: "Mapping[str, ArrayLike] | None" = None,
     period: float | None = None,
     progress: Progress | bool | None = None,
 ) -> "OrbitResult":
@@ -57,9 +59,11 @@ def orbit(
         Parameters and start values by name, in the units of the FMU; enumerations by label or number.
     over : mapping, optional
         A parameter and its increasing values (n,); its two ends for 61 values.
+    inputs : mapping, optional
+        Input signals of one period, as in `simulate`: the column ``"time"`` in s, from 0, and one for each input.
     period : float, optional
-        Period in s of forces that depend on a clock, a state in s with a constant rate. That of a phase angle, a state
-        in rad with a constant rate, is known.
+        Period in s of the inputs, or of forces that depend on a clock, a state in s with a constant rate. That of a
+        phase angle, a state in rad with a constant rate, is known.
     progress : callable or False, optional
         Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
         switches it off.
@@ -85,16 +89,20 @@ def orbit(
 
     axes = {} if over is None else expand_axes(over, DEFAULT_VALUES, 1)
     name, row = next(iter(axes.items()), ("", ()))
-    return compute_orbits(resolve_motion(source, values), name, [*map(float, row)], period, reporter(progress))
+    return compute_orbits(resolve_motion(source, values, inputs), name, [*map(float, row)], period, reporter(progress))
 
 
-@check_arguments(source=PATH, over=OVER, values=SETTINGS, workers=WORKERS, scheduler=TEXT, progress=PROGRESS)
+@check_arguments(
+    source=PATH, over=OVER, values=SETTINGS, period=POSITIVE, workers=WORKERS, scheduler=TEXT, progress=PROGRESS
+)
 @with_progress_bar
 def map_motions(
     source: "str | Path",
     over: "Mapping[str, ArrayLike]",
     values: Mapping[str, float | str] | None = None,
     *,
+    inputs: "Mapping[str, ArrayLike] | None" = None,
+    period: float | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress | bool | None = None,
@@ -107,7 +115,7 @@ def map_motions(
 
     Parameters
     ----------
-    source, values, progress
+    source, values, inputs, period, progress
         As in `orbit`.
     over : mapping
         One or two parameters and their increasing values (n,); two ends for 21 values.
@@ -136,15 +144,18 @@ def map_motions(
 
     axes = expand_axes(over, DEFAULT_GRID, 2)
     check_workers(workers, scheduler)
-    return compute_map(resolve_motion(source, values), axes, workers, scheduler, reporter(progress))
+    return compute_map(resolve_motion(source, values, inputs), axes, workers, scheduler, period, reporter(progress))
 
 
-def resolve_motion(source: "str | Path", values: Mapping[str, float | str] | None) -> "RunSpec":
-    """Return the run of a source with values."""
+def resolve_motion(
+    source: "str | Path", values: Mapping[str, float | str] | None, inputs: "Mapping[str, ArrayLike] | None"
+) -> "RunSpec":
+    """Return the run of a source with values and inputs."""
     from ..simulation.resolve import resolve
 
     spec = resolve(source)
-    return replace(spec, values={**spec.values, **(values or {})})
+    columns = spec.inputs if inputs is None else read_input_columns(inputs)
+    return replace(spec, values={**spec.values, **(values or {})}, inputs=columns)
 
 
 def expand_axes(over: "Mapping[str, ArrayLike]", count: int, most: int) -> "dict[str, np.ndarray]":

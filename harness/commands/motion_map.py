@@ -5,7 +5,7 @@ from functools import partial
 import click
 
 from ..errors import SceneError
-from .orbit import split_axis
+from .orbit import PERIOD_OPTION, split_axis
 from .terminal import (
     SCHEDULER_OPTION,
     SET_OPTION,
@@ -27,6 +27,7 @@ from .terminal import (
     help="Parameter that varies, with its ends and 21 or N values. Once or twice.",
 )
 @SET_OPTION
+@PERIOD_OPTION
 @WORKERS_OPTION
 @SCHEDULER_OPTION
 @result_options
@@ -36,6 +37,7 @@ def map_motions(
     source: str,
     over: tuple[str, ...],
     values: tuple[str, ...],
+    period: float | None,
     workers: int,
     scheduler: str | None,
     terminal: Terminal,
@@ -65,7 +67,7 @@ def map_motions(
     with terminal.progress(1) as report:
         local_workers = None if scheduler else workers
         compute = partial(compute_map, source, axes, settings, workers=local_workers, scheduler=scheduler)
-        compute = partial(compute, progress=partial(report, source))
+        compute = partial(compute, period=period, progress=partial(report, source))
         folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])
         result = save_result(folder, compute, "map", describe_sources(source))
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

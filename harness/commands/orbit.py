@@ -8,12 +8,18 @@ from ..arguments import POSITIVE
 from ..errors import MAX_VALUE_LENGTH, SceneError
 from .terminal import SET_OPTION, RuleType, SectionedCommand, Terminal, result_options
 
+PERIOD_OPTION = click.option(
+    "--period",
+    type=RuleType(POSITIVE),
+    help="Period in s of the inputs of a scene, or of forces that depend on a clock.",
+)
+
 
 @click.command(cls=SectionedCommand)
 @click.argument("source", metavar="MODEL|SCENE|FMU")
 @SET_OPTION
 @click.option("--over", metavar="NAME=LO:HI[:N]", help="Parameter that varies, with its ends and 61 or N values.")
-@click.option("--period", type=RuleType(POSITIVE), help="Period in s of forces that depend on a clock, a state in s.")
+@PERIOD_OPTION
 @result_options
 def orbit(source: str, values: tuple[str, ...], over: str | None, period: float | None, terminal: Terminal) -> None:
     """Print the steady sliding and the periodic motions of a model, and over a parameter the points where they change.

@@ -24,6 +24,7 @@ from .model_data import read_model_data
 from .native_equivalent import check_has_events
 from .runner import open_instance
 from .session import Session, resolve_settings
+from .stepping import TIME, input_signals
 from .variable_values import enumeration_labels, variable_unit
 from .variational import VariationalRun, state_variables
 
@@ -33,6 +34,7 @@ DEFAULT_RTOL = 1e-12
 MAX_STEPS = 200_000  # internal steps of a motion
 MAX_ITERATIONS = 30  # of Newton's method
 SAMPLED = 3  # points of a motion at which derivatives are compared
+PERIODS = 256  # of inputs: more than a motion is followed
 STOP = 1e9  # s: no motion ends there
 
 
@@ -142,8 +144,9 @@ class Oscillator:
         self.rates = tuple(unknown.variable.name for unknown in description.derivatives)
         self.speeds = np.isin(self.states, self.rates).astype(float)
         self.units = {name: variable_unit(variable) for name, variable in self.variables.items()}
-        values = choose_solver(self.variables) | dict(spec.values)
-        self.spec = replace(spec, values=values, start=0.0, stop=STOP, follow=False)
+        values, inputs = choose_solver(self.variables) | dict(spec.values), repeat_inputs(spec.inputs, period)
+        self.spec = replace(spec, values=values, inputs=inputs, start=0.0, stop=STOP, follow=False)
+        self.rows = np.append(np.asarray(inputs.get(TIME, ()), dtype=float), inf)
         self.settings = {variable.name: value for variable, value in resolve_settings(self.spec, self.variables)}
         check_has_events(spec.fmu, self.variables, self.settings)
         angles = [
@@ -158,6 +161,7 @@ class Oscillator:
         self.n_modes, read = len(modes), [*modes, *["events.count"] * bool(modes), *reals]
         self.instance = resources.enter_context(open_instance(self.spec, self.folder))
         self.session = Session(self.instance, self.spec, (*self.varied, *self.initial), read)
+        self.signals = input_signals(self.spec, self.instance)
         self.last_equilibrium: np.ndarray | None = None
         self.set_point([self.default(name) for name in varied])
         self.offsets = np.array([self.default(name) for name in self.initial])
@@ -183,6 +187,8 @@ class Oscillator:
         self.shift = self.turned @ initial
         try:
             self.session.start((*self.point, *initial.tolist()))
+            if self.signals:
+                self.signals.apply(0.0, after_event=True)
         except CALL_FAILURES as error:
             raise self.failure(error) from None
         return self.read(0.0)
@@ -208,7 +214,11 @@ class Oscillator:
         """Go on from a time to another one, in s."""
         self.n_runs += t == 0.0
         try:
+            if self.signals:
+                self.signals.apply_in_step(t, end)
             self.instance.step(t, end - t)
+            if self.signals:
+                self.signals.apply(end, after_event=True)
         except CALL_FAILURES as error:
             raise self.failure(error) from None
         return self.read(end)
@@ -230,7 +240,8 @@ class Oscillator:
             if point.t >= stop:
                 return
             n += point.t == n * every
-            end = min(max(self.t_next, float(np.nextafter(point.t, inf))), stop, n * every)
+            row = float(self.rows[np.searchsorted(self.rows, point.t, side="right")])
+            end = min(max(self.t_next, float(np.nextafter(point.t, inf))), stop, n * every, row)
             point = self.step(point.t, end)
             yield point
         raise HarnessError(f"the motion needs more than {MAX_STEPS} steps until t = {point.t:.6g} s")
@@ -290,8 +301,8 @@ class Oscillator:
             clock = self.states[int(np.argmax(is_clock & (units == "s")))]
             raise HarnessError(f"{name} has forces that depend on the time {clock}: give their period in s")
         phases = np.flatnonzero(is_clock & (units == ("rad" if self.period is None else "s")))
-        if self.period is not None and not len(phases):
-            raise HarnessError(f"{name} has no forces that depend on a time: remove the period")
+        if self.period is not None and not (len(phases) or self.signals):
+            raise HarnessError(f"{name} has no forces that depend on a time, and no inputs: remove the period")
         self.phase = int(phases[0]) if len(phases) else None
         if self.phase is not None and not self.matrix[self.phase].any():
             self.find_phase_parameter(self.phase, states[0])
@@ -338,10 +349,15 @@ class Oscillator:
                 return
 
     @property
+    def is_forced(self) -> bool:
+        """Return whether forces depend on the time."""
+        return self.phase is not None or self.period is not None
+
+    @property
     def forced_period(self) -> float | None:
         """Return the period of the force in s; None without a force."""
         if self.phase is None or self.period is not None:
-            return self.period
+            return self.period  # of the inputs or of a clock
         return 2.0 * pi / abs(float(self.begin(self.start).f[self.phase]))
 
     def reduce(self, y: np.ndarray) -> np.ndarray:
@@ -361,7 +377,7 @@ class Oscillator:
 
     def find_steady_sliding(self) -> SteadySliding | None:
         """Return steady sliding, by Newton's method."""
-        if self.phase is not None:
+        if self.is_forced:
             return None
         for y in chain([] if self.last_equilibrium is None else [self.last_equilibrium], self.sliding_states()):
             for _ in range(MAX_ITERATIONS):
@@ -382,6 +398,27 @@ class Oscillator:
                     self.last_equilibrium = y  # a good guess at the next point
                     return steady
         return None
+
+
+def repeat_inputs(inputs: Mapping[str, Any], period: float | None) -> dict[str, Any]:
+    """Return a table of inputs, which covers a period in s, for all periods of a motion.
+
+    Raises
+    ------
+    SceneError
+        If the period is not given, or is not that of the table.
+    """
+    if not inputs:
+        return {}
+    time = np.asarray(inputs[TIME], dtype=float)
+    if period is None or not (time[0] == 0.0 and abs(time[-1] - period) <= 1e-12 * period):
+        span = f"the inputs are a table from {time[0]:g} to {time[-1]:g} s"
+        raise SceneError(f"{span}: give the table of one period, from 0 s, and the period")
+    numbers = np.arange(PERIODS)[:, None]
+    times = np.hstack([period * numbers + time[:-1], period * (numbers + 1)])
+    return {TIME: times.ravel()} | {
+        name: np.tile(np.asarray(column, dtype=float), PERIODS) for name, column in inputs.items() if name != TIME
+    }
 
 
 def choose_solver(variables: Mapping[str, Any]) -> dict[str, str | float]:

@@ -138,7 +138,7 @@ class ReturnMap:
             return Ending(REST, path[-1].y)
         longest = max(slips, key=lambda slip: slip[-1].t - slip[0].t)
         middle = min(longest, key=lambda point: abs(2.0 * point.t - longest[0].t - longest[-1].t))
-        point = path[0] if self.oscillator.phase is not None and not self.oscillator.sets_phase else middle
+        point = path[0] if self.oscillator.is_forced and not self.oscillator.sets_phase else middle
         return Ending(CYCLE, point.y, path[-1].t - path[0].t, n_sticks)
 
     def distance(self, one: np.ndarray, two: np.ndarray) -> float:
@@ -161,7 +161,7 @@ class ReturnMap:
         """
         oscillator, basis, guess = self.oscillator, self.oscillator.basis, period
         speed = float(np.abs(oscillator.reduce(oscillator.begin(y).f)).max())
-        is_free = oscillator.phase is None
+        is_free = not oscillator.is_forced
         for _ in range(MAX_ITERATIONS):
             end, slopes = oscillator.differentiate(y, period)
             monodromy = basis.T @ slopes @ basis
@@ -189,9 +189,9 @@ class ReturnMap:
     def select_multipliers(self, monodromy: np.ndarray) -> np.ndarray:
         """Return the multipliers, the largest first, without that of the direction of motion."""
         if not np.isfinite(monodromy).all():
-            return np.full(len(monodromy) - (self.oscillator.phase is None), nan)
+            return np.full(len(monodromy) - (not self.oscillator.is_forced), nan)
         values = np.linalg.eigvals(monodromy)
-        if self.oscillator.phase is None:
+        if not self.oscillator.is_forced:
             values = np.delete(values, np.argmin(np.abs(values - 1.0)))
         return values[np.argsort(-np.abs(values))]
 

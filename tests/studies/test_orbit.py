@@ -11,6 +11,7 @@ import pytest
 from build_cache import build_user_model
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.optimize import brentq, minimize_scalar
 
 import harness
@@ -324,6 +325,37 @@ def test_a_force_by_a_clock_has_the_amplitude_of_den_hartog(unit, rate, angle, o
     if options:
         with pytest.raises(harness.HarnessError, match="depend on the time clock: give their period in s"):
             harness.orbit(fmu)
+
+
+def test_an_oscillator_with_a_square_force_has_the_orbit_of_its_closed_form():
+    """It repeats if half a period turns its states around."""
+    c, k, period, force = 2.0, 157.9, 0.8, 10.0
+    inputs = {"time": [0.0, 0.5 * period, 0.5 * period, period], "F_ext": [force, force, -force, -force]}
+    (orbit,) = harness.orbit(native("smd"), {"c": c, "k": k}, inputs=inputs, period=period).motions
+    half = expm(0.5 * period * np.array([[0.0, 1.0], [-k, -c]]))
+    exact = -np.linalg.solve(np.eye(2) + half, (np.eye(2) - half) @ (force / k, 0.0))
+    np.testing.assert_allclose(orbit.y, exact, rtol=1e-10)
+    np.testing.assert_allclose(np.prod(orbit.multipliers), np.linalg.det(half) ** 2, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_an_orbit_with_a_triangular_force_is_the_end_of_a_long_run():
+    period, values = 0.9, {"f": 4.0}
+    inputs = {"time": period * np.array([0.0, 0.25, 0.75, 1.0]), "F_ext": [0.0, 9.0, -9.0, 0.0]}
+    (orbit,) = harness.orbit(native("coulomb"), values, inputs=inputs, period=period).motions
+    long = {
+        "time": np.append((period * np.arange(60)[:, None] + inputs["time"][:-1]).ravel(), 60 * period),
+        "F_ext": np.append(np.tile(inputs["F_ext"][:-1], 60), 0.0),
+    }
+    settings = values | {"solver.method": "dop853", "solver.rtol": 1e-12}
+    run = harness.simulate(native("coulomb"), settings, inputs=long, times=long["time"][1:])
+    assert orbit.n_sticks == 2
+    np.testing.assert_allclose(orbit.y, [run["x"][-1], run["v"][-1]], rtol=1e-8)
+    over = {"f": [3.0, 4.0, 5.0]}
+    labels = harness.map_motions(native("coulomb"), over, inputs=inputs, period=period).labels
+    assert labels[1] == "2 sticks in a period"
+    with pytest.raises(harness.SceneError, match="give the table of one period"):
+        harness.orbit(native("coulomb"), inputs=inputs)
 
 
 def hartog(frequency, m=1.0, k=100.0, force=10.0, friction=6.0):

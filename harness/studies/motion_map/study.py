@@ -58,9 +58,9 @@ class LineSearch:
         return points, labels, edges, self.oscillator.n_runs - before
 
 
-def search_line(spec: RunSpec, fmu: bytes, names: tuple[str, ...], points: np.ndarray) -> Line:
+def search_line(spec: RunSpec, fmu: bytes, names: tuple[str, ...], period: float | None, points: np.ndarray) -> Line:
     """Search a line in a worker, which may not have the file of the FMU."""
-    with BUSY, open_oscillator(replace(spec, fmu=store_fmu(spec.fmu.name, fmu)), names) as oscillator:
+    with BUSY, open_oscillator(replace(spec, fmu=store_fmu(spec.fmu.name, fmu)), names, period) as oscillator:
         return LineSearch(oscillator).search(points)
 
 
@@ -87,6 +87,7 @@ def compute_map(
     axes: dict[str, np.ndarray],
     workers: int | None,
     scheduler: str | None = None,
+    period: float | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> MapResult:
     """Find what motions end in over one or two parameters.
@@ -101,6 +102,8 @@ def compute_map(
         Number of worker processes; None for this process.
     scheduler : str or None
         Address of the scheduler of a Dask cluster, whose workers are used.
+    period : float or None
+        Period in s of the inputs, or of forces that depend on a clock.
     report : callable
         Receives the progress from 0 to 1.
 
@@ -113,7 +116,7 @@ def compute_map(
     """
     names, run = tuple(axes), replace(spec, fmu=native_with_derivatives(spec.fmu))
     lines, grid = grid_lines([*axes.values()]), tuple(axes.values())
-    with open_oscillator(run, names) as oscillator:
+    with open_oscillator(run, names, period) as oscillator:
         units = {name: oscillator.units[name] for name in names}
         settings = {name: oscillator.default(name) for name in oscillator.parameters if name not in names}
     content = run.fmu.read_bytes()
@@ -124,7 +127,7 @@ def compute_map(
             check_interrupt()
             while len(futures) < 2 * max(1, pool.size) and len(results) + len(futures) < len(lines):
                 number = len(results) + len(futures)
-                futures[pool.submit(search_line, run, content, names, lines[number])] = number
+                futures[pool.submit(search_line, run, content, names, period, lines[number])] = number
             for future in pool.wait_for_any(futures):
                 try:
                     results[futures.pop(future)] = future.result()

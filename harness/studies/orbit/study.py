@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import nan
+from math import inf, nan
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -22,7 +22,7 @@ from ...simulation.poincare import (
 )
 from .result import OrbitResult, SpecialPoint
 
-PATH_POINTS = 400  # of an orbit in the phase plane
+PATH_POINTS = 400  # at least, of an orbit in the phase plane
 NEAR = 1e-6  # relative difference of orbits that are the same
 
 
@@ -87,12 +87,9 @@ class BranchTracer:
 
     def trace_path(self, motion: Motion) -> np.ndarray:
         """Return a period of a motion (points, 3): time in s, the state that measures it, and its rate."""
-        points, last = [], self.oscillator.begin(motion.y)
-        is_orbit = motion.kind in (STICK_SLIP, SLIDING_ORBIT)
-        for t in np.linspace(0.0, motion.period, PATH_POINTS + 1)[1:] if is_orbit else ():
-            points.append(last)
-            last = self.oscillator.step(last.t, float(t))
-        return np.array([(p.t, self.oscillator.measure(p.y), self.oscillator.measure(p.f)) for p in (*points, last)])
+        is_orbit, every = motion.kind in (STICK_SLIP, SLIDING_ORBIT), motion.period / PATH_POINTS
+        path = self.oscillator.follow(motion.y, motion.period if is_orbit else 0.0, every if is_orbit else inf)
+        return np.array([(p.t, self.oscillator.measure(p.y), self.oscillator.measure(p.f)) for p in path])
 
     # ---- special points between two values
 
