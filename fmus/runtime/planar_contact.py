@@ -154,7 +154,8 @@ def time_to_rest(model, step, i: ContactIndex):
     load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
     floors = contact_lcp.slip_floors(model, step, step.t0, step.y0)
     peak = location.peaks[i] if location.peaks[i] > floors[i] else floors[i]
-    if size > step.tolerance * peak or not load < friction[i]:
+    unresolved = RESOLVED * TIME_RESOLUTION * step.t0 * friction[i]  # steps in which friction turns it are too short
+    if (size > step.tolerance * peak and size > unresolved) or not load < friction[i]:
         return inf
     duration = size * (friction[i] + along) / ((friction[i] - load) * (friction[i] + load))
     y2 = step.y0 + duration * step.f0

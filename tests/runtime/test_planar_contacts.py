@@ -224,10 +224,10 @@ def solve_pulled(m, k, f, hold, r, speed, stop):
 @pytest.mark.slow
 def test_pulled_body_sticks_and_slips_as_scipy_says(build):
     require_compiler()
-    driver = """    speed = Parameter(0.1, "m/s", "speed of the driver")
+    driver = """    pull = Parameter(0.1, "m/s", "speed of the driver")
     r = Parameter(0.05, "m", "amplitude of the driver")
     Omega = Parameter(5.0, "rad/s", "angular speed")
-    s = State("m", "position of the driver", rate=speed)
+    s = State("m", "position of the driver", rate=pull)
     angle = State("rad", "angle of the driver", rate=Omega)
 """
     loads = {"load_x": "k * (s - x) + F_x", "load_y": "k * (r - r * cos(angle) - y) + F_y"}
