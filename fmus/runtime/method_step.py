@@ -6,7 +6,16 @@ SIAM J. Sci. Comput. 18 (1997) 1-22).
 
 from math import inf
 
-from . import conditions, contact_lcp, event_location, phase_repetition, planar_contact, step_end, step_limits
+from . import (
+    conditions,
+    contact_lcp,
+    event_location,
+    phase_repetition,
+    planar_contact,
+    step_end,
+    step_limits,
+    time_scale,
+)
 from .active_method import SMALLEST_FLOOR
 from .codes import DIVERGED, EPSILON, NEEDS_REPETITION, OK, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
@@ -95,6 +104,8 @@ def accept_proposal(model, step):
     method.raise_scale_floor(model, scale)
     scale = elementwise_max(method.error_scale_floor, scale)
     floor = scale  # of the step, without proposals; set when one is rejected
+    second = scale  # derivatives of the states; set when they are needed, as no state is at rest before
+    has_second = False
     attempts = 0
     while True:
         y1, f1, e = method.propose(model, step, modes, t, y, f, h)
@@ -121,14 +132,17 @@ def accept_proposal(model, step):
         attempts += 1
         size3, other_error = size1, error
         if error * tolerance >= ROUGH_ERROR:  # False for NaN
+            if not has_second:
+                second, _f3, _f4 = time_scale.derivatives(model, t, y, f, modes)
+                has_second = True
             change = h * magnitude(f1)
             size3 = elementwise_max(size1, change)
-            d = d - if_at_rest(y, f, scale, d)
+            d = d - if_at_rest(y, f, second, scale, d)
             e = d / size2
             other_error = h * max_of(e) / tolerance
-        if other_error * tolerance < ROUGH_ERROR and is_roughly_right(h, y, f, y1, f1, size2, scale):
+        if other_error * tolerance < ROUGH_ERROR and is_roughly_right(h, y, f, y1, f1, size2, scale, second):
             if other_error < error:
-                e = method.floor_share * if_at_rest(y, f, scale, size3)
+                e = method.floor_share * if_at_rest(y, f, second, scale, size3)
                 floor = elementwise_max(floor, e)
             method.error_scale_floor = floor
             method.raise_scale_floor(model, size1)
@@ -160,17 +174,24 @@ def accept_proposal(model, step):
 
 
 @elementwise
-def if_at_rest(value, rate, scale, number):
-    """Return a number for a state that has always been zero and begins without a rate, and 0 for others.
+def if_at_rest(value, first, second, scale, number):
+    """Return a number for a state that has always been zero and starts with t^3 or later, and 0 for others.
 
     In a method of order 3, the error of a state that starts with t^4 is as large as the state, however short the step.
     It is relative to what the state reaches in the first proposal whose other states are roughly right.
     """
-    return number if value == 0.0 and rate == 0.0 and scale <= SMALLEST_FLOOR else 0.0
+    return number if value == first == second == 0.0 and scale <= SMALLEST_FLOOR else 0.0
 
 
 def is_roughly_right(
-    h, y: StateVector, f: RateVector, y1: StateVector, f1: RateVector, size: StateVector, scale: StateVector
+    h,
+    y: StateVector,
+    f: RateVector,
+    y1: StateVector,
+    f1: RateVector,
+    size: StateVector,
+    scale: StateVector,
+    second: StateVector,
 ):
     """Return whether a rejected proposal shows how large states become that are zero so far.
 
@@ -183,7 +204,7 @@ def is_roughly_right(
     most = elementwise_max(rate0, rate1)
     excess = change - ROUGH_CHANGE * h * most
     d = rate1 / size
-    d = d - if_at_rest(y, f, scale, d)
+    d = d - if_at_rest(y, f, second, scale, d)
     return h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from build_cache import build_user_model
+from build_cache import ROOT, build_user_model
 from models import DOP853, ODE23, ODE45, RADAU9, RODAS
 from scipy.linalg import expm
 from variants import slow_after
@@ -57,3 +57,16 @@ def test_a_pushed_chain_starts_with_every_method(worker, tmp_path, n, method):
         assert np.abs(np.array(fmu.get(*names)) - expected).max() < 2e-3 * expected.max()
     assert fmu.get("solver.rejected") < 50
     fmu.free()
+
+
+@pytest.mark.slow  # the campaign of symmetries does the same with all models
+def test_a_first_step_past_the_end_of_a_slip_decides_nothing(worker):
+    """Sled 1 breaks away with v of order t^2; the step to try is that at rest, sixteen times as long as its slip."""
+    path = build_user_model(ROOT / "fmus" / "more" / "sleds.py", "--method=dop853") / "sleds.fmu"
+    speeds = []
+    for h_max in (0.0, 1.6e4):
+        fmu = worker.instantiate(path).begin({"solver.h_max": h_max}, stop=16.0)
+        fmu.step(0.0, 4.5)
+        speeds += fmu.get("v_1")
+        fmu.free()
+    assert abs(speeds[1] - speeds[0]) < 1e-5 * abs(speeds[0])
