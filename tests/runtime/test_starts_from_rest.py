@@ -67,6 +67,6 @@ def test_a_first_step_past_the_end_of_a_slip_decides_nothing(worker):
     for h_max in (0.0, 1.6e4):
         fmu = worker.instantiate(path).begin({"solver.h_max": h_max}, stop=16.0)
         fmu.step(0.0, 4.5)
-        speeds += fmu.get("v_1")
+        speeds.append(fmu.get("v_1"))
         fmu.free()
     assert abs(speeds[1] - speeds[0]) < 1e-5 * abs(speeds[0])
