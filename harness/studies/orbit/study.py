@@ -164,7 +164,7 @@ class BranchTracer:
 
     def locate_sticks(self, a: Motion, b: Motion) -> SpecialPoint:
         """Return the value at which the number of sticks in a period changes, by bisection."""
-        seed = [a]
+        seed, n_remarks = [a], len(self.remarks)
 
         def is_same_kind(value: float) -> bool:
             found = self.find_motions(value, [seed[0].y])
@@ -174,6 +174,7 @@ class BranchTracer:
             return False
 
         ((edge, *_),) = find_edges(is_same_kind, a.value, b.value, True, False)
+        del self.remarks[n_remarks:]  # on values between these two
         names = [
             motion.kind if motion.kind == AT_REST else f"{motion.n_sticks} sticks in a period" for motion in (a, b)
         ]
