@@ -24,7 +24,7 @@ from .model_data import read_model_data
 from .native_equivalent import check_has_events
 from .runner import open_instance
 from .session import Session, resolve_settings
-from .stepping import TIME, input_signals
+from .stepping import TIME, check_inputs, input_signals
 from .variable_values import enumeration_labels, variable_unit
 from .variational import VariationalRun, state_variables
 
@@ -144,6 +144,7 @@ class Oscillator:
         self.rates = tuple(unknown.variable.name for unknown in description.derivatives)
         self.speeds = np.isin(self.states, self.rates).astype(float)
         self.units = {name: variable_unit(variable) for name, variable in self.variables.items()}
+        check_inputs(spec.inputs, self.variables, spec.values)
         values, inputs = choose_solver(self.variables) | dict(spec.values), repeat_inputs(spec.inputs, period)
         self.spec = replace(spec, values=values, inputs=inputs, start=0.0, stop=STOP, follow=False)
         self.rows = np.append(np.asarray(inputs.get(TIME, ()), dtype=float), inf)

@@ -108,9 +108,13 @@ class ReturnMap:
                 maxima.clear()
             if new.t == len(returns) * period if period else last.sticks and not new.sticks:
                 for old in returns[: -MAX_MULTIPLE - 1 : -1]:
-                    closest = min(closest, self.distance(old.y, new.y) / scale if old.modes == new.modes else inf)
-                    if closest <= REPEATS:
-                        return self.describe_cycle([item for item in path if item.t >= old.t])
+                    difference = self.distance(old.y, new.y) / scale if old.modes == new.modes else inf
+                    closest = min(closest, difference)
+                    if difference <= REPEATS:
+                        cycle = [item for item in path if item.t >= old.t]
+                        size = max(float(np.abs(oscillator.reduce(item.y)).max()) for item in cycle)
+                        if difference * scale <= REPEATS * size:  # the motion was larger before
+                            return self.describe_cycle(cycle)
                 returns.append(new)
                 if len(returns) > count:
                     end = self.describe_cycle([item for item in path if item.t >= returns[-2].t])
@@ -150,6 +154,21 @@ class ReturnMap:
         return self.oscillator.measure(last.f) > 0.0 >= self.oscillator.measure(point.f)
 
     # ---- orbits
+
+    def find_orbit(self, end: Ending) -> Motion:
+        """Return the orbit in which a motion ends; where it has no derivatives, as a cycle that repeats.
+
+        Raises
+        ------
+        NoOrbitError
+            If none is found.
+        """
+        try:
+            return self.shoot(end.y, end.period)
+        except NoOrbitError:
+            if end.kind != CYCLE:
+                raise
+            return self.measure_orbit(end.y, end.period, np.full(1, nan))
 
     def shoot(self, y: np.ndarray, period: float) -> Motion:
         """Return the orbit near states y and a period in s, by Newton's method.

@@ -91,8 +91,8 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "lenient": FLAG,
         "progress": {"type"},
     },
-    "orbit": {"values": {"{}"}, "progress": {"type"}},
-    "map_motions": {"values": {"{}"}, "progress": {"type"}},
+    "orbit": {"values": {"{}"}, "inputs": {"{}"}, "progress": {"type"}},
+    "map_motions": {"values": {"{}"}, "inputs": {"{}"}, "progress": {"type"}},
     "load_result": {},
     "measure": {"unit": {"'x'", "'8'", "long text"}},
     "read_record": {

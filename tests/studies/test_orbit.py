@@ -351,6 +351,8 @@ def test_an_orbit_with_a_triangular_force_is_the_end_of_a_long_run():
     run = harness.simulate(native("coulomb"), settings, inputs=long, times=long["time"][1:])
     assert orbit.n_sticks == 2
     np.testing.assert_allclose(orbit.y, [run["x"][-1], run["v"][-1]], rtol=1e-8)
+    stuck = harness.orbit(native("coulomb"), over={"f": [5.0, 6.5, 8.0]}, inputs=inputs, period=period)
+    assert [(item.n_sticks, item.stability) for item in stuck.motions] == [(2, "stable"), (2, "stable"), (2, "")]
     over = {"f": [3.0, 4.0, 5.0]}
     labels = harness.map_motions(native("coulomb"), over, inputs=inputs, period=period).labels
     assert labels[1] == "2 sticks in a period"

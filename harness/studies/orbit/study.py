@@ -61,7 +61,7 @@ class BranchTracer:
                 remarks.append(describe_irregular(end.closest))
             elif steady is None or self.map.distance(end.y, steady.y) > NEAR * self.map.distance(seed, steady.y):
                 try:
-                    orbits.append(self.map.shoot(end.y, end.period))
+                    orbits.append(self.map.find_orbit(end))
                 except NoOrbitError as error:
                     remarks.append(f"from the start, {error}.")
         for orbit in orbits:
