@@ -193,7 +193,7 @@ def update_indicators(run, model):
             slips = model.slip_velocities(solver.t, solver.y)
             sizes = model.slip_magnitudes(solver.t, solver.y)
             force, limit, _sizes, terms = model.contact_forces(solver.t, solver.y, solver.modes)
-            if model.has_prescribed_slips and run.phase != EVENT:
+            if run.phase != EVENT:
                 for i in contact_indices:
                     exchange.slip_errors[i] = fabs(slips[i]) if solver.modes[i] == STUCK else 0.0
             for i in contact_indices:
@@ -326,9 +326,7 @@ def update_modes(run, model):
     needs_restart = changed = False
     step = solver.step
     if model.is_coupled:
-        y = solver.y
-        if model.has_prescribed_slips:
-            y = contact_lcp.follow_inputs(model, solver.t, y, solver.modes, exchange.slip_errors)
+        y = contact_lcp.follow_inputs(model, solver.t, solver.y, solver.modes, exchange.slip_errors)
         y, modes, step.has_consistent_modes = contact_lcp.resolve_at_start(
             model, step, solver.t, y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
         )
