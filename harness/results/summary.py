@@ -172,8 +172,9 @@ class ResultColumn:
     is_text: bool = False
 
     def cell(self, item: Any) -> str:
-        """Return the text of an item."""
-        return self.text.format(item) if isinstance(self.text, str) else self.text(item)
+        """Return the text of an item; nothing for a NaN."""
+        text = self.text.format(item) if isinstance(self.text, str) else self.text(item)
+        return "" if text == "nan" else text
 
 
 @dataclass(frozen=True)
