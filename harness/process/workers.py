@@ -58,7 +58,7 @@ def connect_cluster(address: str, unload: Callable[[], None]) -> Iterator[DaskCl
     try:
         # not as the default, which xarray uses to write a file, even after it failed to connect
         client = Client(address, timeout=10, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, AssertionError) as error:  # the last one rarely, of an invalid address
         raise HarnessError(f"no scheduler found at {address}: {first_line(error)}") from None
     with client:
         cluster = DaskCluster(client, address)
