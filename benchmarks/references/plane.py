@@ -19,26 +19,30 @@ SLOW = 1e-3  # m/s: below this speed the direction turns too fast for the second
 
 def rest(m: float, F: float, f: float, speed: float, phi: float) -> tuple[float, float, float]:
     """Return time and position of the rest; F < f."""
-    path = _path(m, F, f, speed, phi)
-    return tuple(map(float, path(0)[:3]))  # type: ignore[return-value]
+    from mpmath import mp
+
+    with mp.workdps(DIGITS):
+        path = _path(m, F, f, speed, phi)
+        return tuple(map(float, path(0)[:3]))  # type: ignore[return-value]
 
 
 def motion(m: float, F: float, f: float, speed: float, phi: float, times: Sequence[float]) -> np.ndarray:
     """Return x, y, v_x and v_y at the times; F < f."""
     from mpmath import mp
 
-    path = _path(m, F, f, speed, phi)
-    stop, x, y, *_ = path(0)
-    rows: list[Any] = []
-    for t in times:
-        if t >= stop:
-            rows.append([x, y, mp.mpf(0), mp.mpf(0)])
-            continue
-        low, high = mp.mpf(0), mp.tan(mp.mpf(phi) / 2)
-        for _ in range(BISECTIONS):
-            middle = (low + high) / 2
-            low, high = (middle, high) if path(middle)[0] > t else (low, middle)
-        rows.append(path(low if t else high)[1:])
+    with mp.workdps(DIGITS):
+        path = _path(m, F, f, speed, phi)
+        stop, x, y, *_ = path(0)
+        rows: list[Any] = []
+        for t in times:
+            if t >= stop:
+                rows.append([x, y, mp.mpf(0), mp.mpf(0)])
+                continue
+            low, high = mp.mpf(0), mp.tan(mp.mpf(phi) / 2)
+            for _ in range(BISECTIONS):
+                middle = (low + high) / 2
+                low, high = (middle, high) if path(middle)[0] > t else (low, middle)
+            rows.append(path(low if t else high)[1:])
     return np.array(rows, dtype=float)
 
 
@@ -46,7 +50,6 @@ def _path(m: Any, F: Any, f: Any, speed: Any, phi: Any) -> Callable[[Any], tuple
     """Return a function of u that returns time, position and velocity."""
     from mpmath import mp
 
-    mp.dps = DIGITS
     m, F, f, speed, phi = map(mp.mpf, (m, F, f, speed, phi))
     k, start = f / F, mp.tan(phi / 2)
     C = 2 * speed * start ** (1 - k) / (1 + start * start)
