@@ -52,9 +52,13 @@ def rates_method(context: CodegenContext, of_terms: bool = False) -> str:
         return method_source(name, context.arguments, emit_return(printer, targets))
     elif analysis.contacts:
         terms = force_unknown(context, analysis.line_contacts).terms
-        context.emit_driver(printer, [*targets, *terms, *slips_of_laws(analysis)])
-        printer.count_uses(*targets, *terms)
+        limits = [analysis.holding_limit[c] for c in analysis.line_contacts] if of_terms else []
+        context.emit_driver(printer, [*targets, *terms, *limits, *slips_of_laws(analysis)])
+        printer.count_uses(*targets, *terms, *limits)
         emit_friction_forces(context, printer, analysis.line_contacts)
+        for c, limit in zip(analysis.line_contacts, limits, strict=False):
+            # the force of a stuck contact is a sum that may cancel
+            printer.emit(f"{c.name} = fabs({c.name}) + ({printer.text(limit)} if {c.mode.name} == 0 else 0.0)")
         return method_source(name, context.arguments, emit_return(printer, targets))
     return method_source(name, context.arguments, context.return_lines(printer, targets))
 
