@@ -34,6 +34,7 @@ ORDERS = np.arange(ORDER + 2.0)[:, None]
 GRID = np.linspace(0.0, 1.0, 65)  # points of a step where guards are evaluated
 GRID_POWERS = GRID[:, None] ** np.arange(ORDER + 1)
 MAX_EVENTS = 2000
+MAX_PIECES = 10_000  # series of one motion; hundreds are usual
 
 
 @dataclass(frozen=True)
@@ -303,6 +304,8 @@ class _Run:
         while self.t < stop:
             series = self.expand(self.modes, ORDER)
             self.solution.pieces.append(series)
+            if len(self.solution.pieces) > MAX_PIECES:
+                raise UnsolvableError(f"more than {MAX_PIECES} series until {self.t}")
             h_full = self.step_size(series)
             h = min(h_full, stop - self.t)
             guards = self.guards(series, at_event)
