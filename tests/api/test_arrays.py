@@ -57,6 +57,7 @@ def test_numbers_that_a_mask_hides_are_missing(user_folder, monkeypatch):
     assert "6 of 121 rows have a missing cell" in str(harness.identify_decay((t, x), unit="m", drag=False))
 
 
+@pytest.mark.slow
 def test_time_deltas_are_seconds_and_labels_may_be_an_array(user_folder, monkeypatch):
     monkeypatch.chdir(user_folder)
     delta = pandas.to_timedelta(T, unit="s")

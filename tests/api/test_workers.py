@@ -26,6 +26,7 @@ def test_a_script_without_a_main_guard_sweeps_twice_and_leaves_no_files(workspac
     assert list((workspace / "temporary").iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="the system cannot wait for the end of a grandchild")
 def test_the_files_of_a_killed_sweep_are_removed_by_its_workers_or_by_the_next_command(workspace):
     temporary = workspace / "temporary"

@@ -232,11 +232,11 @@ def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run,
         *slow_after(
             3,
             [
-                (1, "a call did not return within 4 s (--timeout sets the limit), after t = 0.5 s"),
                 (2, "its binary crashed (Segmentation fault), after t = 0.5 s"),
                 (3, "fmi2DoStep returned Fatal at t = 0.5 s: "),
                 (5, "x is nan at t = 0.515625 s"),
                 (6, "it terminated the simulation: fmi2DoStep returned Discard with fmi2Terminated at t = 0.5 s"),
+                (1, "a call did not return within 4 s (--timeout sets the limit), after t = 0.5 s"),
             ],
         ),
         pytest.param(7, "a call did not return within 4 s", marks=pytest.mark.campaign),  # as 1, stopped by a signal

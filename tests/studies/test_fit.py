@@ -626,7 +626,7 @@ def test_slips_that_an_input_makes_irregular_are_described_by_the_fit_alone():
 @pytest.mark.parametrize(
     ("kind", "words"),
     slow_after(
-        1,
+        0,
         [
             ("lag", "x lags by 0.02"),
             ("warming", "c rises during the record"),

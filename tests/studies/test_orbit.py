@@ -488,6 +488,7 @@ def test_a_map_by_a_cluster_is_the_same():
         harness.map_motions(source, over, values, workers=2, scheduler="tcp://127.0.0.1:1")
 
 
+@pytest.mark.slow
 def test_the_map_of_a_forced_mass_counts_its_stops():
     result = harness.map_motions(native("forced"), {"Omega": [5.0, 6.0, 7.0]})
     assert result.labels == (*["2 sticks in a period"] * 2, "0 sticks in a period")

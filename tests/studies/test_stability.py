@@ -227,6 +227,7 @@ def test_every_scene_states_its_expected_ending_for_an_existing_model():
         assert ("{" in scene["title"]) == ("each" in scene), scene["title"]
 
 
+@pytest.mark.slow
 def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(user_folder)
     result = measure_stability(grouped_cases(is_sampled()), ignore_progress)

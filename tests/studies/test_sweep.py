@@ -110,6 +110,7 @@ def test_a_sled_pulled_backward_has_the_measures_of_one_pulled_forward(sweep):
     assert forward[1] == pytest.approx(3.7169, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(command, tmp_path):
     for workers in (1, 2):
         done = command(*MAP, "--workers", workers, "--out", f"out{workers}")
@@ -189,6 +190,7 @@ def test_an_external_fmu_is_swept_or_refused_with_a_reason(command, tmp_path, na
     assert any(len(set(measured.to_numpy().tolist())) == 2 for measured in data.data_vars.values())
 
 
+@pytest.mark.slow
 def test_crashing_and_failing_runs_of_an_external_fmu_are_reported_individually(command, tmp_path):
     """With kind 0 it succeeds, with 2 it crashes, with 6 it fails."""
     trouble = external_fmus.build_external_fmus() / "Faulty.fmu"
