@@ -5,8 +5,9 @@ from functools import partial
 import click
 
 from ..errors import SceneError
-from .orbit import PERIOD_OPTION, split_axis
+from .orbit import split_axis
 from .terminal import (
+    PERIOD_OPTION,
     SCHEDULER_OPTION,
     SET_OPTION,
     WORKERS_OPTION,

@@ -4,15 +4,8 @@ from functools import partial
 
 import click
 
-from ..arguments import POSITIVE
 from ..errors import MAX_VALUE_LENGTH, SceneError
-from .terminal import SET_OPTION, RuleType, SectionedCommand, Terminal, result_options
-
-PERIOD_OPTION = click.option(
-    "--period",
-    type=RuleType(POSITIVE),
-    help="Period in s of the inputs of a scene, or of forces that depend on a clock.",
-)
+from .terminal import PERIOD_OPTION, SET_OPTION, SectionedCommand, Terminal, result_options
 
 
 @click.command(cls=SectionedCommand)

@@ -122,6 +122,11 @@ WORKERS_OPTION = click.option(
 SCHEDULER_OPTION = click.option(
     "--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786."
 )
+PERIOD_OPTION = click.option(
+    "--period",
+    type=POSITIVE,
+    help="Period in s of the inputs of a scene, or of forces that depend on a clock.",
+)
 STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
 RUN_OPTIONS = (
     STOP_OPTION,

@@ -129,7 +129,7 @@ class ReturnMap:
     def describe_cycle(self, path: list[Point]) -> Ending:
         """Return the cycle that a motion has gone through, with the middle of its longest slip.
 
-        If the phase of a force is always the same at the start, it is the begin of its period instead.
+        If the phase of a force is always the same at the start, it is the start of its period instead.
         """
         slips, n_sticks = list[list[Point]](), 0
         for last, point in zip([path[0], *path], path, strict=False):

@@ -7,6 +7,7 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from threading import Lock
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,14 @@ from .result import Edge, MapResult
 STEADY, STICK_SLIP, BOTH, NEITHER = "steady sliding", "stick-slip", "steady sliding or stick-slip", "neither"
 
 BUSY = Lock()  # messages of FMUs are captured by one thread at a time
-Line = tuple[np.ndarray, list[str], list[Edge], int]  # points (n, axes), labels, edges, and the number of runs
+
+
+class Line(NamedTuple):
+    """Labels (n,) of the points of a line, the edges between them, and the number of runs."""
+
+    labels: list[str]
+    edges: list[Edge]
+    n_runs: int
 
 
 class LineSearch:
@@ -55,7 +63,7 @@ class LineSearch:
         for (one, two), (a, b) in zip(pairwise(labels), pairwise(points), strict=True):
             for low, high, *names in find_edges(self.label, a, b, one, two):
                 edges.append(Edge(tuple((0.5 * (low + high)).tolist()), *names))
-        return points, labels, edges, self.oscillator.n_runs - before
+        return Line(labels, edges, self.oscillator.n_runs - before)
 
 
 def search_line(spec: RunSpec, fmu: bytes, names: tuple[str, ...], period: float | None, points: np.ndarray) -> Line:
@@ -135,6 +143,7 @@ def compute_map(
                     raise HarnessError(f"{spec.fmu.name}: a worker process died") from None
                 report(len(results) / len(lines))
     ordered = [results[number] for number in range(len(lines))]
-    labels = [label for _, found, _, _ in ordered[: len(grid[-1]) if len(grid) > 1 else 1] for label in found]
-    edges = tuple(edge for _, _, found, _ in ordered for edge in found)
-    return MapResult(spec, units, grid, tuple(labels), edges, sum(runs for *_, runs in ordered), settings)
+    first_lines = ordered[: len(grid[-1]) if len(grid) > 1 else 1]  # those along the first parameter have all points
+    labels = tuple(label for line in first_lines for label in line.labels)
+    edges = tuple(edge for line in ordered for edge in line.edges)
+    return MapResult(spec, units, grid, labels, edges, sum(line.n_runs for line in ordered), settings)

@@ -151,7 +151,7 @@ class BranchTracer:
         pair = (below if is_below else above)[-2:]
 
         def value_of(amplitude: float) -> float:
-            """Return the value at which a turn ends with the amplitude of its begin."""
+            """Return the value at which a turn ends with the amplitude with which it starts."""
             return find_root(
                 lambda value: self.map.turn(self.steady_sliding(value), amplitude)[0] / amplitude - 1.0, low, high
             )
