@@ -105,8 +105,9 @@ class RequestServer:
             os.ftruncate(2, 0)
 
     def send(self, kind: str, content: Any) -> None:
-        """Send a reply to the parent."""
-        write_message(self.reply_stream, pickle.dumps((kind, content), pickle.HIGHEST_PROTOCOL))
+        """Send a reply to the parent. If it was killed, read_requests removes the files and ends this process."""
+        with suppress(BrokenPipeError):
+            write_message(self.reply_stream, pickle.dumps((kind, content), pickle.HIGHEST_PROTOCOL))
 
 
 def portable_error(error: HarnessError) -> HarnessError:
