@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections import defaultdict
+from pathlib import Path
 
 import argument_values
 import commands
@@ -115,7 +116,7 @@ def test_a_value_is_used_or_refused_in_one_sentence(fmus, tmp_path):
     """A refusal is a HarnessError within the time limit; nothing else is raised, and no process dies."""
     (tmp_path / "fmus").symlink_to(fmus)
     (tmp_path / "native").symlink_to(build_native_fmus())
-    program = [sys.executable, commands.SUPPORT / "argument_values.py", tmp_path]
+    program = [sys.executable, Path(__file__).with_name("argument_values.py"), tmp_path]
     environment = os.environ | {"PYTHONPATH": str(commands.ROOT)}
     done = subprocess.run(program, env=environment, capture_output=True, text=True, timeout=3600)
     assert done.returncode == 0, done.stderr

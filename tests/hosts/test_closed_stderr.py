@@ -1,8 +1,11 @@
 """An error is handled however standard error is lost: the step fails, and the log contains the message."""
 
+from pathlib import Path
+
 import pytest
-from closed_stderr import STDERR_FAILURES
 from worker_client import run_script
+
+from tests.hosts.closed_stderr import STDERR_FAILURES
 
 *OBJECTS, _, _, _, _ = STDERR_FAILURES  # these can be tested one after another in one process
 PROCESSES = [OBJECTS, *([failure] for failure in STDERR_FAILURES if failure not in OBJECTS)]
@@ -12,7 +15,7 @@ PROCESSES = [OBJECTS, *([failure] for failure in STDERR_FAILURES if failure not 
 @pytest.mark.parametrize("failures", PROCESSES, ids=lambda failures: failures[-1])
 def test_an_error_survives_the_loss_of_standard_error(fmus, failures):
     """The process exits cleanly, too. The instance name is not ASCII."""
-    answers = run_script("closed_stderr.py", "run_all", fmus / "pendulum.fmu", failures)
+    answers = run_script(Path(__file__).with_name("closed_stderr.py"), "run_all", fmus / "pendulum.fmu", failures)
     assert len(answers) == len(failures)
     for answer in answers:
         assert answer["status"] == 2  # discard is all that the native layer can return

@@ -7,11 +7,13 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from interrupted_host import HANDLERS
 from variants import slow_after
 from worker_client import run_script_with_stderr
 
+from tests.hosts.interrupted_host import HANDLERS
 from tests.hosts.test_python_hosts import PYTHONS, interpreter
+
+HOST = Path(__file__).with_name("interrupted_host.py")
 
 
 @pytest.fixture
@@ -22,7 +24,7 @@ def fmu(fmus):
 @pytest.mark.parametrize("handler", slow_after(1, HANDLERS))
 def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
     """The host gets the exception that its signal handler raised, once, and no later than at the end of the call."""
-    answer, stderr = run_script_with_stderr("interrupted_host.py", "interrupt_long_step", fmu, handler)
+    answer, stderr = run_script_with_stderr(HOST, "interrupt_long_step", fmu, handler)
     arguments = {"KeyboardInterrupt": [], "SystemExit": [143], "Stop": ["enough", 3]}
     assert answer["reached"] == [handler, arguments[handler]]
     ((status, category, sentence),) = answer["log"]
@@ -35,7 +37,7 @@ def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
 
 def test_an_interrupt_during_any_call_reaches_the_host(fmu):
     """Also if the signal is handled when a function of the FMU is entered, before its first line."""
-    answer, stderr = run_script_with_stderr("interrupted_host.py", "interrupt_short_steps", fmu, 150)
+    answer, stderr = run_script_with_stderr(HOST, "interrupt_short_steps", fmu, 150)
     assert answer == [["KeyboardInterrupt"], 150]
     assert all("was interrupted" in line for line in stderr.splitlines())
 

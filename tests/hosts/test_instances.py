@@ -5,14 +5,16 @@ and print nothing. Memory is measured with glibc.
 """
 
 from functools import partial
+from pathlib import Path
 
 import fmi3_fixtures
 import native_fmus
 import pytest
 import worker_client
 from build_cache import ROOT
-from life_cycles import MODEL_EXCHANGE
 from models import MODELS, outputs
+
+from tests.hosts.life_cycles import MODEL_EXCHANGE
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +22,7 @@ CO_SIMULATION = "CoSimulation"
 BACKENDS = ("python", "native", "fmi3")
 FOLDER_NAMES = ("with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200)
 
-run_script = partial(worker_client.run_script, "life_cycles.py")
+run_script = partial(worker_client.run_script, Path(__file__).with_name("life_cycles.py"))
 
 
 def fmus_of(backend, python_fmus, names=MODELS):

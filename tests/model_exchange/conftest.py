@@ -2,7 +2,8 @@
 
 import fmi3_fixtures
 import pytest
-from model_exchange_client import BREAKAWAY_TIME, DRIVER, DRY, handle_event_at
+
+from tests.model_exchange.model_exchange_client import BREAKAWAY_TIME, DRIVER, DRY, handle_event_at
 
 fmus = fmi3_fixtures.fmus
 

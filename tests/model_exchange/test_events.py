@@ -3,8 +3,19 @@
 from math import isfinite
 
 import pytest
-from model_exchange_client import BREAKAWAY_TIME, DRIVER, HOLD, SLIDE, G, K, M, handle_event_at, single_error
 from models import EXACT, MODELS, SIGN, THRESHOLD, declared
+
+from tests.model_exchange.model_exchange_client import (
+    BREAKAWAY_TIME,
+    DRIVER,
+    HOLD,
+    SLIDE,
+    G,
+    K,
+    M,
+    handle_event_at,
+    single_error,
+)
 
 
 def test_the_sled_breaks_away_slides_and_sticks_again(launch):

@@ -3,12 +3,12 @@
 from math import inf, isnan, nan
 
 import pytest
-from model_exchange_client import DRIVEN, handle_event_at, single_error
 from models import MODELS, declared, model_class, outputs, push, runtime
 from worker_client import FmiError
 
 from fmus.compiler.lowering import model_exchange_run
 from fmus.runtime.codes import DIVERGED, OK
+from tests.model_exchange.model_exchange_client import DRIVEN, handle_event_at, single_error
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 

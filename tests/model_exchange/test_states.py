@@ -2,10 +2,11 @@
 reset."""
 
 import pytest
-from model_exchange_client import DRIVEN, DRIVER, DRY, K, handle_event_at, single_error
 from models import MODELS, counts, declared, each_case, model_class, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
+
+from tests.model_exchange.model_exchange_client import DRIVEN, DRIVER, DRY, K, handle_event_at, single_error
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 

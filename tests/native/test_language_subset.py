@@ -3,7 +3,8 @@
 import math
 
 import pytest
-from compiled_methods import PAIRS, CompiledMethods, assert_same_as_python
+
+from tests.native.compiled_methods import PAIRS, CompiledMethods, assert_same_as_python
 
 THIRD, FEW = 1.0 / 3.0, 3
 

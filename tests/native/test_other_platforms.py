@@ -44,7 +44,7 @@ WINE = [
 MACHINES = {"win64": ["wine"], "aarch64-linux": ["qemu-aarch64", "-L", ARM]}  # and the command that runs their programs
 PROGRAM = {  # additional source of a program, and options; no libraries of the compiler
     "win64": (
-        [HOST_SOURCE.with_name("windows_runtime.c")],
+        [Path(__file__).with_name("windows_runtime.c")],
         [
             "-nostdlib",
             "-Wl,-e,mainCRTStartup",

@@ -4,7 +4,8 @@ import importlib.util
 import random
 
 import pytest
-from compiled_methods import PAIRS, CompiledMethods, assert_same_as_python
+
+from tests.native.compiled_methods import PAIRS, CompiledMethods, assert_same_as_python
 
 pytestmark = pytest.mark.slow
 

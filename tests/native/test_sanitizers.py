@@ -1,6 +1,6 @@
 """The sources of the native FMUs under the address and undefined-behaviour sanitizers, with calls that FMI forbids.
 
-See tests/support/fmi2_stress.c and, for FMI 3.0, fmi3_stress.c.
+See fmi2_stress.c and, for FMI 3.0, fmi3_stress.c.
 """
 
 import os

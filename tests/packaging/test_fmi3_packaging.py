@@ -54,7 +54,9 @@ def inspect(fmu, tmp_path_factory):
         ("nominals", "pacejka", "x_m", 1e-5)
     ]
     calls = [(function, fmu(name), *more) for function, name, *more in requests]
-    answers = worker_client.run_script("fmi3_inspection.py", "call_each", calls, folder=tmp_path_factory.mktemp("fmi3"))
+    answers = worker_client.run_script(
+        Path(__file__).with_name("fmi3_inspection.py"), "call_each", calls, folder=tmp_path_factory.mktemp("fmi3")
+    )
     return lambda *call: answers[requests.index(call)]
 
 

@@ -31,7 +31,8 @@ def digest_sources():
     for name, version in sorted((item.name, item.version) for item in distributions()):
         digest.update(f"{name} {version}".encode())
     files = [file for folder in (ROOT / "fmus", SUPPORT) for file in folder.rglob("*.*") if file.is_file()]
-    for file in sorted({ROOT / "build_fmus.py", *files}):
+    programs = (ROOT / "tests/native").glob("*.[ch]")
+    for file in sorted({ROOT / "build_fmus.py", *files, *programs}):
         if file.suffix not in (".fmu", ".pyc"):
             digest.update(str(file.relative_to(ROOT)).encode() + file.read_bytes())
     return digest.hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""The C programs of tests/support, compiled once per test run, and scripts for the host."""
+"""The C programs of the tests, compiled once per test run, and scripts for the host."""
 
 import os
 import shutil
@@ -11,7 +11,7 @@ from xml.etree.ElementTree import fromstring
 import build_cache
 import fmpy
 import pytest
-from models import declared, model_class, outputs
+from models import ROOT, declared, model_class, outputs
 
 from fmus.packaging.native.binaries import STRICT
 
@@ -51,9 +51,9 @@ def host_program(sanitizers="", version="2"):
 
 
 def compile_sanitized(source, fmu, *options, sanitizers=SANITIZERS):
-    """Compile the program `source` of tests/support together with the sources in an FMU, which it includes."""
+    """Compile the program `source` of tests/native together with the sources in an FMU, which it includes."""
     name, sources = f"{source} {fmu.stem}", unpack_cached(fmu) / "sources"
-    words = ["-c", "-fPIC", "-fvisibility=hidden", f"-I{sources}", HOST_SOURCE.with_name(source)]
+    words = ["-c", "-fPIC", "-fvisibility=hidden", f"-I{sources}", ROOT / "tests/native" / source]
     program = compile_cached(name, *words, sanitizers=sanitizers)
     return compile_cached(" ".join([name, "linked", *options]), *options, program, sanitizers=sanitizers)
 

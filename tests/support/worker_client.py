@@ -15,7 +15,7 @@ TIMEOUT = 120.0  # s, per request
 
 
 def run_script(script, function, *arguments, **options):
-    """Return the result of a function of a support script, run in a process that must exit cleanly and print no
+    """Return the result of a function of a script, run in a process that must exit cleanly and print no
     errors."""
     answer, stderr = run_script_with_stderr(script, function, *arguments, **options)
     assert stderr == ""
@@ -23,7 +23,7 @@ def run_script(script, function, *arguments, **options):
 
 
 def run_script_with_stderr(script, function, *arguments, folder=None, timeout=300):
-    """Return the result and standard error of a function of a support script."""
+    """Return the result and standard error of a function of a script."""
     command = [*isolated_python(script), function, json.dumps(arguments, default=str)]
     done = subprocess.run(command, cwd=folder, env=environment(), capture_output=True, text=True, timeout=timeout)
     assert done.returncode == 0, f"exit status {done.returncode}: {done.stderr}"
@@ -31,8 +31,8 @@ def run_script_with_stderr(script, function, *arguments, folder=None, timeout=30
 
 
 def isolated_python(script):
-    """Return the command that runs a support script, without the folders of the project on the path."""
-    return [sys.executable, "-I", str(Path(__file__).with_name(script))]
+    """Return the command that runs a script, without the folders of the project on the path."""
+    return [sys.executable, "-I", str(Path(__file__).parent / script)]
 
 
 def environment():

@@ -7,7 +7,6 @@ from dataclasses import replace
 import commands
 import numpy as np
 import pytest
-from symmetry_models import build, examine
 from variants import slow_after
 
 from benchmarks.symmetry.builds import PYTHON, all_models, find_source
@@ -16,6 +15,7 @@ from benchmarks.symmetry.equations import Equations
 from benchmarks.symmetry.long_run import find_irregular_period
 from benchmarks.symmetry.model_text import move_frame, reverse_declarations
 from benchmarks.symmetry.motion import FmuRuns, Motion, find_difference
+from tests.symmetry.symmetry_models import build, examine
 
 LITERAL = """
 from fmus import Model, Output, Parameter, State

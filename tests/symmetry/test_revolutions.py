@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from models import scalar_class
 from native_fmus import require_compiler
-from symmetry_models import build
 
 import harness
 from benchmarks.symmetry.builds import NATIVE, PYTHON
 from benchmarks.symmetry.changes import REVOLUTIONS, REVOLUTIONS_ADDED
 from benchmarks.symmetry.command import describe
 from benchmarks.symmetry.study import run_model
+from tests.symmetry.symmetry_models import build
 
 HEAD = """from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State, choose, cos, sin, sqrt
 

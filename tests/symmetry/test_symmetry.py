@@ -8,13 +8,13 @@ from io import StringIO
 import pytest
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st
-from symmetry_models import KINDS, LABELS, examine, open_model
 from variants import slow_after
 
 from benchmarks.symmetry.builds import FMI3, NATIVE
 from benchmarks.symmetry.changes import FRAME, LONG, MIRROR, REVOLUTIONS, TIME, UNITS
 from benchmarks.symmetry.command import describe
 from benchmarks.symmetry.study import Options, list_choices
+from tests.symmetry.symmetry_models import KINDS, LABELS, examine, open_model
 
 FEW = {"max_steps": 200, "starts": (1e6,), "scales": ((40, 20, 10),)}
 MORE = {

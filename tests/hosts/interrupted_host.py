@@ -6,8 +6,9 @@ import signal
 import sys
 import tempfile
 from math import isnan
+from pathlib import Path
 
-sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not search the folder of its script
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))  # an isolated Python searches no other folder
 
 import worker
 

@@ -15,12 +15,13 @@ import threading
 from ctypes import c_double
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from shutil import rmtree
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not search the folder of its script
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))  # an isolated Python searches no other folder
 
 import fmi3_as_fmi2
 
