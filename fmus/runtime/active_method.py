@@ -5,7 +5,7 @@ from math import inf
 from .codes import EXACT
 from .linear_closed_form import LinearClosedForm
 from .method_registry import methods
-from .vectors import ContactVector, RateVector, StateVector, elementwise_max, velocity_indices
+from .vectors import ContactVector, StateVector, elementwise_max, velocity_indices
 
 EXACT_ITEM = ("exact", EXACT, "closed form of each linear segment, with events; hybrid law only")
 SMALLEST_FLOOR = 1e-150  # is a divisor, so not zero; its inverse times an error does not overflow
@@ -50,8 +50,8 @@ class ActiveMethod:
                     self.error_scale_floor[i] = self.nominal_velocity
 
     def propose(
-        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
-    ) -> tuple[StateVector, RateVector, StateVector]:
+        self, model, step, modes: ContactVector, t, y: StateVector, f: StateVector, h
+    ) -> tuple[StateVector, StateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         method_number = self.method_number
         for label, file, _ in methods:

@@ -5,7 +5,7 @@ from math import inf
 from . import step_end
 from .codes import DIVERGED, OK
 from .step_end import OVERFLOW_LIMIT
-from .vectors import magnitude, sum_of
+from .vectors import magnitude, sum_of, velocity_indices
 
 
 def advance_linear_segment(model, step):
@@ -13,7 +13,9 @@ def advance_linear_segment(model, step):
     exact = step.active_method.exact
     roundoff = step.roundoff
     roundoff.carry()
-    exact.start_segment(step.y0, step.f0, model.applied_acceleration(step.t0, step.modes0), roundoff.x0)
+    p = model.applied_acceleration(step.t0, step.modes0)
+    for i in velocity_indices:  # one
+        exact.start_segment(step.y0, step.f0[i], p, roundoff.x0)
     if model.has_dry_friction:
         duration = exact.next_standstill(step.modes0)  # may shorten the horizon
     step.t1 = step.t_end if step.t_end - step.t0 <= exact.horizon else step.t0 + exact.horizon

@@ -7,7 +7,7 @@ DOP853: its coefficients in double precision under the same names (A1210: stage 
 from math import sqrt
 
 from .codes import STUCK
-from .vectors import ContactVector, RateVector, StateVector, elementwise
+from .vectors import ContactVector, StateVector, elementwise
 
 NUMBER, TEXT = 4, "Dormand-Prince 8(5,3); for tight tolerances"
 STAGES = 12  # evaluations of the right-hand side in a step; the last one serves the next step
@@ -74,8 +74,8 @@ class Dop853:
         self.f6 = self.f7 = self.f8 = self.f9 = self.f10 = self.f11 = self.f12 = 0.0
 
     def propose(
-        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
-    ) -> tuple[StateVector, RateVector, StateVector]:
+        self, model, step, modes: ContactVector, t, y: StateVector, f: StateVector, h
+    ) -> tuple[StateVector, StateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + h * (A21 * f)
         f2 = model.rates(t + C2 * h, y2, modes)

@@ -15,7 +15,7 @@ from . import conditions, contact_lcp, stick_slip
 from .codes import EPSILON, ROUNDOFF_MARGIN
 from .conditions import CONDITION_MARGIN, TINY
 from .interpolant import largest_of, smallest_of
-from .vectors import ContactVector, RateVector, StateVector, contact_indices, slip_index
+from .vectors import ContactVector, StateVector, contact_indices, slip_index
 
 DEGREE = 8  # of the polynomial through an event function; interpolants have degree 7 at most
 # The interpolant adds less than this share of the range of the cubic Hermite polynomial, except in a search
@@ -38,9 +38,11 @@ class EventLocation:
     """
 
     phase_y: StateVector
-    phase_f: RateVector
+    phase_f: StateVector
 
     def __init__(self, n):
+        # at the end of a step: a velocity only touches zero and the slip continues; modes satisfy the force balance
+        self.grazes_at_end, self.has_consistent_modes = False, True
         # of each event function at the latest evaluation: value, size (of its terms), scale of its rounding errors
         self.values, self.scales, self.roundings = [0.0] * n, [0.0] * n, [0.0] * n
         self.near_middle = [0.0] * n  # values after 0.4 of the step

@@ -12,7 +12,7 @@ from .event_location import EventLocation
 from .interpolant import Interpolant
 from .step_counters import RoundoffCompensation, StepCounters
 from .step_kind import follows_closed_form, has_events, has_law_without_sticking, is_at_rest
-from .vectors import ContactVector, RateVector, StateVector, error_size, planar_indices
+from .vectors import ContactVector, StateVector, error_size, planar_indices
 
 
 class InternalStep:
@@ -23,9 +23,9 @@ class InternalStep:
     """
 
     y0: StateVector
-    f0: RateVector
+    f0: StateVector
     y1: StateVector
-    f1: RateVector
+    f1: StateVector
     modes0: ContactVector
     modes1: ContactVector
 
@@ -41,9 +41,7 @@ class InternalStep:
         self.t0 = self.y0 = self.f0 = 0.0
         self.t1 = self.y1 = self.f1 = 0.0
         self.modes0 = self.modes1 = STUCK
-        # nothing moves; a mode changes at t1; a velocity only touches zero at t1 and the slip continues
-        self.is_stuck = self.event_at_end = self.grazes_at_end = False
-        self.has_consistent_modes = True  # False if no modes satisfy the force balance at t1
+        self.is_stuck = self.event_at_end = False  # nothing moves; a mode changes at t1
         # step size before an event shortened the step; interpolant
         self.h_full = 0.0
         self.interpolant = Interpolant()

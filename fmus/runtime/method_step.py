@@ -24,7 +24,7 @@ from .rate_rounding import smallest_sizes
 from .step_end import OVERFLOW_LIMIT
 from .step_kind import has_law_without_sticking, has_narrow_features
 from .vectors import (
-    RateVector,
+    ContactVector,
     StateVector,
     complete_rates,
     contact_indices,
@@ -104,8 +104,6 @@ def accept_proposal(model, step):
     method.raise_scale_floor(model, scale)
     scale = elementwise_max(method.error_scale_floor, scale)
     floor = scale  # of the step, without proposals; set when one is rejected
-    second = scale  # derivatives of the states; set when they are needed, as no state is at rest before
-    has_second = False
     attempts = 0
     while True:
         y1, f1, e = method.propose(model, step, modes, t, y, f, h)
@@ -130,23 +128,7 @@ def accept_proposal(model, step):
             step.save_scale_floor()
             floor = step.start_counters.error_scale_floor
         attempts += 1
-        size3, other_error = size1, error
-        if error * tolerance >= ROUGH_ERROR:  # False for NaN
-            if not has_second:
-                second, _f3, _f4 = time_scale.derivatives(model, t, y, f, modes)
-                has_second = True
-            change = h * magnitude(f1)
-            size3 = elementwise_max(size1, change)
-            d = d - if_at_rest(y, f, second, scale, d)
-            e = d / size2
-            other_error = h * max_of(e) / tolerance
-        if other_error * tolerance < ROUGH_ERROR and is_roughly_right(h, y, f, y1, f1, size2, scale, second):
-            if other_error < error:
-                e = method.floor_share * if_at_rest(y, f, second, scale, size3)
-                floor = elementwise_max(floor, e)
-            method.error_scale_floor = floor
-            method.raise_scale_floor(model, size1)
-            scale = elementwise_max(method.error_scale_floor, scale)
+        scale, floor = scales_after_rejection(model, step, modes, h, y1, f1, d, error, scale, floor)
         if h <= h_min or attempts == MAX_TRIES:
             return STALLED if error < inf and sum_of(size1) < OVERFLOW_LIMIT else DIVERGED
         shrink = 0.5
@@ -173,6 +155,43 @@ def accept_proposal(model, step):
     return OK
 
 
+def scales_after_rejection(
+    model,
+    step,
+    modes: ContactVector,
+    h,
+    y1: StateVector,
+    f1: StateVector,
+    d: StateVector,
+    error,
+    scale: StateVector,
+    floor: StateVector,
+) -> tuple[StateVector, StateVector]:
+    """Return the scale of the errors, and its floor without proposals, after a rejected one with the error estimate d.
+
+    A proposal that is roughly right shows how large states become that are zero so far.
+    """
+    method = step.active_method
+    size = error_size(y1)
+    size1 = elementwise_max(size, scale)
+    most, second, other_error = size, scale, error  # with these derivatives, no state is at rest
+    if error * step.tolerance >= ROUGH_ERROR:  # False for NaN
+        second, _f3, _f4 = time_scale.derivatives(model, step.t0, step.y0, step.f0, modes)
+        change = h * magnitude(f1)
+        most = elementwise_max(size, change)
+        d = d - if_at_rest(step.y0, step.f0, second, scale, d)
+        e = d / size1
+        other_error = h * max_of(e) / step.tolerance
+    if other_error * step.tolerance < ROUGH_ERROR and is_roughly_right(step, h, y1, f1, size1, scale, second):
+        if other_error < error:
+            e = method.floor_share * if_at_rest(step.y0, step.f0, second, scale, most)
+            floor = elementwise_max(floor, e)
+        method.error_scale_floor = floor
+        method.raise_scale_floor(model, size)
+        scale = elementwise_max(method.error_scale_floor, scale)
+    return scale, floor
+
+
 @elementwise
 def if_at_rest(value, first, second, scale, number):
     """Return a number for a state that has always been zero and starts with t^3 or later, and 0 for others.
@@ -184,27 +203,20 @@ def if_at_rest(value, first, second, scale, number):
 
 
 def is_roughly_right(
-    h,
-    y: StateVector,
-    f: RateVector,
-    y1: StateVector,
-    f1: RateVector,
-    size: StateVector,
-    scale: StateVector,
-    second: StateVector,
+    step, h, y1: StateVector, f1: StateVector, size: StateVector, scale: StateVector, second: StateVector
 ):
     """Return whether a rejected proposal shows how large states become that are zero so far.
 
     Their error is always large relative to what they reach.  A rate that is large relative to that shows an unstable
     proposal.  So does a change that the rates at neither end explain.
     """
-    rate0, rate1 = magnitude(f), magnitude(f1)
-    change = y1 - y
+    rate0, rate1 = magnitude(step.f0), magnitude(f1)
+    change = y1 - step.y0
     change = magnitude(change)
     most = elementwise_max(rate0, rate1)
     excess = change - ROUGH_CHANGE * h * most
     d = rate1 / size
-    d = d - if_at_rest(y, f, second, scale, d)
+    d = d - if_at_rest(step.y0, step.f0, second, scale, d)
     return h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0
 
 

@@ -270,7 +270,7 @@ def handle_event(run, model):
             if status != OK:
                 return status
     if model.has_dry_friction:
-        solver.step.has_consistent_modes = True
+        solver.step.event_location.has_consistent_modes = True
     if solver.step.is_hybrid:
         if update_modes(run, model):
             exchange.states_changed = True
@@ -285,7 +285,7 @@ def handle_event(run, model):
         status = conditions.violation_status(model, solver.step.event_location)
         if status != OK:
             return status
-    if model.has_dry_friction and not solver.step.has_consistent_modes:
+    if model.has_dry_friction and not solver.step.event_location.has_consistent_modes:
         return NO_CONSISTENT_MODES
     return OK if sum_of(magnitude(solver.y)) < OVERFLOW_LIMIT else DIVERGED
 
@@ -327,7 +327,7 @@ def update_modes(run, model):
     step = solver.step
     if model.is_coupled:
         y = contact_lcp.follow_inputs(model, solver.t, solver.y, solver.modes, exchange.slip_errors)
-        y, modes, step.has_consistent_modes = contact_lcp.resolve_at_start(
+        y, modes, step.event_location.has_consistent_modes = contact_lcp.resolve_at_start(
             model, step, solver.t, y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
@@ -349,7 +349,9 @@ def update_modes(run, model):
                 if solver.modes[i] != last_mode:
                     changed = True
                     if solver.modes[i] != STUCK and solver.y[slip_index[i]] == 0.0:
-                        step.has_consistent_modes = stick_slip.is_consistent(model, solver.t, solver.y, solver.modes, i)
+                        step.event_location.has_consistent_modes = stick_slip.is_consistent(
+                            model, solver.t, solver.y, solver.modes, i
+                        )
     if changed:
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t

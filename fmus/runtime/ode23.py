@@ -4,7 +4,7 @@ P. Bogacki, L. F. Shampine, A 3(2) pair of Runge-Kutta formulas, Appl. Math. Let
 L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22.
 """
 
-from .vectors import ContactVector, RateVector, StateVector
+from .vectors import ContactVector, StateVector
 
 NUMBER, TEXT = 2, "Bogacki-Shampine 3(2), step control as in MATLAB; for loose tolerances"
 STAGES = 3  # evaluations of the right-hand side in a step; the last one serves the next step
@@ -16,8 +16,8 @@ class Ode23:
     """Method with a cubic Hermite interpolant."""
 
     def propose(
-        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
-    ) -> tuple[StateVector, RateVector, StateVector]:
+        self, model, step, modes: ContactVector, t, y: StateVector, f: StateVector, h
+    ) -> tuple[StateVector, StateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + 0.5 * h * f
         f2 = model.rates(t + 0.5 * h, y2, modes)

@@ -5,7 +5,7 @@ L. F. Shampine, Some practical Runge-Kutta formulas, Math. Comp. 46 (1986) 135-1
 E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.6.
 """
 
-from .vectors import ContactVector, RateVector, StateVector
+from .vectors import ContactVector, StateVector
 
 NUMBER, TEXT = 3, "Dormand-Prince 5(4), step control as in MATLAB; for moderate tolerances"
 STAGES = 6  # evaluations of the right-hand side in a step; the last one serves the next step
@@ -37,8 +37,8 @@ class Ode45:
         self.f3 = self.f4 = self.f5 = self.f6 = 0.0
 
     def propose(
-        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
-    ) -> tuple[StateVector, RateVector, StateVector]:
+        self, model, step, modes: ContactVector, t, y: StateVector, f: StateVector, h
+    ) -> tuple[StateVector, StateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + h * A21 * f
         f2 = model.rates(t + C2 * h, y2, modes)

@@ -12,7 +12,7 @@ from math import inf
 from typing import Any
 
 from .variable_declarations import VariableOwner
-from .vectors import ConditionVector, ContactVector, Derivatives, RateVector, StateVector
+from .vectors import ConditionVector, ContactVector, Derivatives, Rates, StateVector
 
 
 class Oscillator(VariableOwner):
@@ -68,13 +68,13 @@ class Oscillator(VariableOwner):
     def initial_state(self, t: float) -> StateVector:
         """Return the states at the start time t."""
 
-    def rates(self, t: float, y: StateVector, modes: ContactVector) -> RateVector:
+    def rates(self, t: float, y: StateVector, modes: ContactVector) -> Rates:
         """Return the rates of the states; a generated method returns those that are not states themselves.
 
         A mode is the direction of sliding, or 0 where the friction law evaluates the velocity itself.
         """
 
-    def rate_magnitudes(self, t: float, y: StateVector, modes: ContactVector) -> RateVector:
+    def rate_magnitudes(self, t: float, y: StateVector, modes: ContactVector) -> Rates:
         """Return bounds on the magnitudes of the terms of these rates, to which their rounding errors are relative."""
 
     def jacobian(self, t: float, y: StateVector, modes: ContactVector) -> Derivatives:

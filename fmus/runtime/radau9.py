@@ -15,7 +15,6 @@ from math import nan
 from .rate_rounding import smallest_sizes
 from .vectors import (
     ContactVector,
-    RateVector,
     StateVector,
     all_of,
     complete_rates,
@@ -144,8 +143,8 @@ class Radau9:
         self.h_last = 0.0
 
     def propose(
-        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
-    ) -> tuple[StateVector, RateVector, StateVector]:
+        self, model, step, modes: ContactVector, t, y: StateVector, f: StateVector, h
+    ) -> tuple[StateVector, StateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error.
 
         e is NaN if the iteration does not converge.

@@ -10,7 +10,7 @@ from .vectors import contact_indices, contact_vector, min_of, slip_index
 def advance_stuck(model, step):
     """Stay at rest until a load exceeds the holding limit."""
     step.roundoff.carry()
-    step.is_stuck, step.grazes_at_end = True, False
+    step.is_stuck, step.event_location.grazes_at_end = True, False
     step.y1 = step.y0
     for i in contact_indices:
         step.y1[slip_index[i]] = 0.0

@@ -11,7 +11,7 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.7; G. Stein
 method RODASP, in: Progress in Differential-Algebraic Equations II, Springer 2020, 165-184 (coefficients).
 """
 
-from .vectors import ContactVector, RateVector, StateVector, factorize, select_kinematic, solve_factored
+from .vectors import ContactVector, StateVector, factorize, select_kinematic, solve_factored
 
 NUMBER, TEXT = 5, "Rosenbrock 4(3), L-stable; for stiff friction curves"
 STAGES = 6  # evaluations of the right-hand side in a step, besides one Jacobian; the last one serves the next step
@@ -55,8 +55,8 @@ class Rodas:
         self.k1 = self.k2 = self.k3 = self.k4 = self.k5 = 0.0
 
     def propose(
-        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
-    ) -> tuple[StateVector, RateVector, StateVector]:
+        self, model, step, modes: ContactVector, t, y: StateVector, f: StateVector, h
+    ) -> tuple[StateVector, StateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         f_t, J = model.jacobian(t, y, modes)
         drift = h * f_t

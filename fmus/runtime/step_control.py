@@ -34,7 +34,7 @@ def try_next(model, step):
         if status != OK:
             return status
         conditions.begin_step(model, step.event_location)
-    if model.has_dry_friction and not step.has_consistent_modes:
+    if model.has_dry_friction and not step.event_location.has_consistent_modes:
         return NO_CONSISTENT_MODES
     step.begin(model)
     if stays_at_rest(model, step):

@@ -48,11 +48,11 @@ def end_at(model, step, h):
             other = location.times[len(step.modes0) + i]
             ends[i] = location.times[i] if location.times[i] < other else other
         if model.has_slip_conditions and contact_lcp.have_jumped(model, step, end, step.y1, slips):
-            step.y1, step.modes1, step.has_consistent_modes = contact_lcp.resolve_at_start(
+            step.y1, step.modes1, step.event_location.has_consistent_modes = contact_lcp.resolve_at_start(
                 model, step, end, step.y1, step.modes0, ROUNDOFF_MARGIN, tie_tolerance(model, step)
             )
         elif model.is_coupled:
-            step.y1, step.modes1, step.has_consistent_modes = contact_lcp.resolve_after_event(
+            step.y1, step.modes1, step.event_location.has_consistent_modes = contact_lcp.resolve_after_event(
                 model, step, h, ends, tie_tolerance(model, step)
             )
         else:
@@ -75,7 +75,7 @@ def end_at_rest(model, step, duration, i: ContactIndex):
     for j in contact_indices:
         ends[j] = inf
     ends[i] = duration
-    step.y1, step.modes1, step.has_consistent_modes = contact_lcp.resolve_after_event(
+    step.y1, step.modes1, step.event_location.has_consistent_modes = contact_lcp.resolve_after_event(
         model, step, duration, ends, tie_tolerance(model, step)
     )
     step.interpolant.set_line(step)
@@ -111,20 +111,21 @@ def tie_tolerance(model, step):
 
 def update_end_modes(model, step, modes: ContactVector, tie_tolerance):
     """Determine the modes after t1, given the previous modes."""
-    step.modes1, step.grazes_at_end, step.has_consistent_modes = STUCK, False, True
+    location = step.event_location
+    step.modes1, location.grazes_at_end, location.has_consistent_modes = STUCK, False, True
     if has_law_without_sticking(model, step):
         step.modes1 = modes  # they change at the ends of steps: see update_law_modes
     if step.is_hybrid:
         if model.is_coupled:
-            step.y1, step.modes1, step.has_consistent_modes = contact_lcp.resolve_at_start(
+            step.y1, step.modes1, location.has_consistent_modes = contact_lcp.resolve_at_start(
                 model, step, step.t1, step.y1, modes, tie_tolerance, tie_tolerance
             )
         else:
             for i in contact_indices:
                 step.modes1[i] = stick_slip.resolve_mode(model, step.t1, step.y1, tie_tolerance, i)
                 if step.y1[slip_index[i]] == 0.0 and step.modes1[i] != modes[i] != STUCK:
-                    if stick_slip.is_grazing(model, step.event_location, step.t1, step.y1, modes, tie_tolerance, i):
-                        step.modes1[i], step.grazes_at_end = modes[i], True
+                    if stick_slip.is_grazing(model, location, step.t1, step.y1, modes, tie_tolerance, i):
+                        step.modes1[i], location.grazes_at_end = modes[i], True
 
 
 def update_end_rates(model, step):
@@ -141,7 +142,8 @@ def update_end_rates(model, step):
             for i in contact_indices:
                 has_no_slip = step.is_hybrid and step.y1[slip_index[i]] == 0.0
                 if has_no_slip and step.modes1[i] * step.f1[slip_index[i]] < 0.0:
-                    step.has_consistent_modes = step.grazes_at_end or stick_slip.is_consistent(
+                    location = step.event_location
+                    location.has_consistent_modes = location.grazes_at_end or stick_slip.is_consistent(
                         model, step.t1, step.y1, step.modes1, i
                     )
                     step.f1[slip_index[i]] = 0.0  # rounding at a break-away: no body starts against its mode

@@ -19,7 +19,11 @@ def is_at_rest(model, step, modes):
 @inlined
 def stays_at_rest(model, step):
     """Return whether nothing moves in the step that begins, or a velocity has only touched zero."""
-    return model.rests_when_stuck and step.is_hybrid and (all_of(step.modes0 == STUCK) or step.grazes_at_end)
+    return (
+        model.rests_when_stuck
+        and step.is_hybrid
+        and (all_of(step.modes0 == STUCK) or step.event_location.grazes_at_end)
+    )
 
 
 @inlined

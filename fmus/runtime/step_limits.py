@@ -14,7 +14,6 @@ from .step_kind import has_narrow_features
 from .time_scale import time_scale
 from .vectors import (
     ContactVector,
-    RateVector,
     StateVector,
     any_of,
     contact_indices,
@@ -168,7 +167,7 @@ def shorten_step(step):
     step.n_rejected += 1
 
 
-def narrow_feature_share(model, step, h, y1: StateVector, f1: RateVector):
+def narrow_feature_share(model, step, h, y1: StateVector, f1: StateVector):
     """Return the share of a step to which it must be shortened, so that it passes no narrow feature; 1.0 if it fits.
 
     A step that begins near the zero of a slip may change it by one width; other steps may only come near.  The cubic

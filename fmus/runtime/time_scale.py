@@ -4,7 +4,6 @@ from math import fabs, inf, sqrt
 
 from .vectors import (
     ContactVector,
-    RateVector,
     StateVector,
     elementwise,
     elementwise_max,
@@ -15,7 +14,7 @@ from .vectors import (
 )
 
 
-def initial_step(model, step, t, y: StateVector, f: RateVector, modes: ContactVector) -> tuple[float, StateVector]:
+def initial_step(model, step, t, y: StateVector, f: StateVector, modes: ContactVector) -> tuple[float, StateVector]:
     """Estimate the first step at t, and how far it moves the states.
 
     The estimate uses the rates at t and their derivatives along the linearized motion; with an absolute tolerance of
@@ -42,7 +41,7 @@ def initial_step(model, step, t, y: StateVector, f: RateVector, modes: ContactVe
     return h, size
 
 
-def smooth_rate(model, t, y: StateVector, f: RateVector, modes: ContactVector):
+def smooth_rate(model, t, y: StateVector, f: StateVector, modes: ContactVector):
     """Return the reciprocal of the time in which the rates of the linearized motion change."""
     f2, f3, f4 = derivatives(model, t, y, f, modes)
     changes = rate_of_rate(f, f2, f3, f4)
@@ -51,7 +50,7 @@ def smooth_rate(model, t, y: StateVector, f: RateVector, modes: ContactVector):
 
 
 def derivatives(
-    model, t, y: StateVector, f: RateVector, modes: ContactVector
+    model, t, y: StateVector, f: StateVector, modes: ContactVector
 ) -> tuple[StateVector, StateVector, StateVector]:
     """Return the second to fourth derivatives of the states along the linearized motion."""
     f_t, J = model.jacobian(t, y, modes)

@@ -12,10 +12,8 @@ class StateVector(Any):
     """Numbers for all states."""
 
 
-class RateVector(StateVector):
-    """The rates at the StateVector that is declared last before it, among the attributes of a class, the parameters of
-    a function and its results.  Scalars are not stored twice: those of its rates that are states are read from there.
-    """
+class Rates(StateVector):
+    """Rates of all states, from a generated method that computes those that are not states themselves."""
 
 
 class ContactVector(Any):
@@ -27,7 +25,7 @@ class ConditionVector(Any):
 
 
 ContactIndex = int
-Derivatives = tuple[RateVector, Any]  # of rates by time, and by the states
+Derivatives = tuple[StateVector, Any]  # of rates by time, and by the states
 
 # Indices of the model: all states; states that are the rate of another; all contacts; contacts in a plane; for each
 # contact the index of its slip velocity and of the state whose rate that is, and whether it acts in a plane.
@@ -95,7 +93,7 @@ def kinematic_rates(y):
     """Return, for states whose rate is a state, that rate."""
 
 
-def complete_rates(y: StateVector, others) -> RateVector:
+def complete_rates(y: StateVector, others) -> StateVector:
     """Return the rates at y: those that are states from y, the others from a vector."""
 
 

@@ -109,7 +109,7 @@ def test_sliding_friction_above_static_friction_is_reported_and_stops_the_run(sl
     model, exchange, run = externally_integrated(slider, {"press": 5.0})
     model.F_ext = 4.5
     exchange.update_modes(run, model)
-    assert not run.solver.step.has_consistent_modes
+    assert not run.solver.step.event_location.has_consistent_modes
     model, exchange, run = externally_integrated(slider, {"press": 3.9})
     model.F_ext = 4.5
     exchange.update_modes(run, model)

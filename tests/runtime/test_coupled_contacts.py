@@ -360,7 +360,7 @@ def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
         start(model, run, model.initial_state(0.0), 1.0)
         solutions = balanced_modes(-model.k * x, mu_s, mu_d)
         modes = tuple(components(run.solver.step, "modes1", model.contacts))
-        assert run.solver.step.has_consistent_modes
+        assert run.solver.step.event_location.has_consistent_modes
         assert modes in solutions
         assert modes.count(0) == max(one.count(0) for one in solutions)
         n_choices += len(solutions) > 1

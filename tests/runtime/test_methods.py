@@ -73,13 +73,13 @@ class Solver:
         step = runtime(TWO_STATES, "internal_step").InternalStep(model_class(TWO_STATES))
         step.tolerance = 1e-12  # of the iteration of implicit methods, with a scale of 1
         step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
-        new = self.method.propose(model, step, t, x, v, a, h)
+        x1, v1, _, a1, e_x, e_v = self.method.propose(model, step, t, x, v, v, a, h)
         self.evaluations = step.active_method.stages
-        step.t0, step.y0_x, step.y0_v, step.f0_v, step.h_full = t, x, v, a, h
-        step.y1_x, step.y1_v, step.f1_v = new[:3]
+        step.t0, step.y0_x, step.y0_v, step.f0_x, step.f0_v, step.h_full = t, x, v, v, a, h
+        step.y1_x, step.y1_v, step.f1_x, step.f1_v = x1, v1, v1, a1
         self.method.build_interpolant(model, step)
         self.inside = step.interpolant
-        return new
+        return x1, v1, a1, e_x, e_v
 
 
 @pytest.fixture

@@ -86,12 +86,12 @@ class Damped:
 
 
 def propose(model, x, v, h, tolerance=1e-10):
-    """Return new states and rate, error estimates, and the evaluations that the method reports."""
+    """Return new states and rates, error estimates, and the evaluations that the method reports."""
     step = begin_step(model, tolerance)
     a = model.rates(0.0, x, v)
     model.evaluations = 0
     method = runtime("pacejka", "radau9").Radau9()
-    return method.propose(model, step, 0.0, x, v, a, h), step.active_method.stages
+    return method.propose(model, step, 0.0, x, v, v, a, h), step.active_method.stages
 
 
 def begin_step(model, tolerance):
@@ -129,12 +129,12 @@ def test_a_step_elsewhere_is_that_of_a_new_run():
     control = step.active_method
 
     def propose_elsewhere(method):
-        result = method.propose(model, step, 0.7, 0.5, 0.7, model.rates(0.7, 0.5, 0.7), 0.2)
+        result = method.propose(model, step, 0.7, 0.5, 0.7, 0.7, model.rates(0.7, 0.5, 0.7), 0.2)
         return *result, control.stages, control.safety, control.grow, control.shrink_after_rejection
 
-    x, v, a, *_ = used_method.propose(model, step, 0.0, 1.0, -0.3, model.rates(0.0, 1.0, -0.3), 0.1)
+    x, v, _, a, *_ = used_method.propose(model, step, 0.0, 1.0, -0.3, -0.3, model.rates(0.0, 1.0, -0.3), 0.1)
     step.n_accepted = 1
-    used_method.propose(model, step, 0.1, x, v, a, 0.1)
+    used_method.propose(model, step, 0.1, x, v, v, a, 0.1)
     assert used_method.h_last == 0.1
     assert propose_elsewhere(used_method) == propose_elsewhere(new)
 

@@ -12,12 +12,12 @@ from types import ModuleType
 from typing import get_args, get_origin
 
 from fmus.runtime import linear_solver
-from fmus.runtime.vectors import ConditionVector, ContactIndex, ContactVector, Derivatives, RateVector, StateVector
+from fmus.runtime.vectors import ConditionVector, ContactIndex, ContactVector, Derivatives, Rates, StateVector
 
 __all__ = ["ConditionVector", "Derivatives", "load_vector_model"]
 RUNTIME = Path(linear_solver.__file__).parent
 PACKAGE = "vector_sources"
-VECTOR_TYPES = (StateVector, RateVector, ContactVector, ConditionVector)
+VECTOR_TYPES = (StateVector, Rates, ContactVector, ConditionVector)
 
 state_indices, velocity_indices, contact_indices, slip_index, position_index = [], [], [], [], []
 planar_indices, is_planar = [], []
@@ -238,7 +238,7 @@ def call_with_scalars(cls, name, types):
         arguments = arguments[:-1] if ContactIndex in types.values() else arguments
         scalars = [x for argument in arguments for x in (argument if isinstance(argument, list) else [argument])]
         result = getattr(cls, name)(self, t, *scalars)
-        if name in ("rates", "rate_magnitudes"):
+        if returned is Rates:
             y, rates = arguments[0], iter(result if isinstance(result, tuple) else (result,))
             return Vector(next(rates) if is_dynamic[i] else y[rate_index[i]] for i in state_indices)
         if name == "jacobian":
@@ -267,6 +267,6 @@ def pass_vectors_to(closed_form):
         x, v, lost = state(self, t)
         return (x, v), lost
 
-    closed_form.start_segment = lambda self, y, f, p, lost: start(self, *y, f[1], p, lost)
+    closed_form.start_segment = lambda self, y, a, p, lost: start(self, *y, a, p, lost)
     closed_form.next_standstill = lambda self, modes: standstill(self, modes[0])
     closed_form.state_at_standstill = state_at_standstill

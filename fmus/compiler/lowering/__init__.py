@@ -11,9 +11,8 @@
     import_hook.py         imports the lowered model into this process
 
 An annotation such as `e: StateVector` of a parameter, result or class attribute declares a vector; results of vector
-operations are vectors.  A RateVector holds the rates at the StateVector that is declared last before it; so does the
-result of model.rates(t, y2, modes) at y2.  Those of its rates that are states are read from there.  Components are
-named after the states and modes of the model: y2_x and y2_v of y2, modes0_mode of modes0, J_v_x of a Jacobian J.
+operations are vectors.  Components are named after the states and modes of the model: y2_x and y2_v of y2, modes0_mode
+of modes0, J_v_x of a Jacobian J.
 
 A ConditionVector is stored in a list, as in margins[:] = model.condition_margins(t, y, modes).
 

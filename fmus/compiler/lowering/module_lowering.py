@@ -1,12 +1,13 @@
 """Lowers a file: unrolls loops, selects the branches that a model needs, and replaces vectors by scalars."""
 
 import ast
+from collections import Counter
 
-from ..syntax_trees import parsed_module, replace_fields
+from ..syntax_trees import all_nodes, parsed_module, replace_fields
 from .constant_folding import known_truth
 from .layout import ModelLayout
 from .scalarize import LOOP_RANGES, METHOD_LOOP, Scalarizer
-from .vector_symbols import SourceSymbols, annotated_kind, annotated_results, is_marked, item_label, pair_rates
+from .vector_symbols import SourceSymbols, annotated_kind, annotated_results, is_marked, item_label
 
 SOLVER_IMPORTS = ("fabs", "nan")  # names of math in the statements of elimination.py
 
@@ -120,13 +121,12 @@ class FileLowerer:
     def lower_function(self, node: ast.FunctionDef, contacts: list[str], i: int) -> ast.FunctionDef:
         """Lower a function; its parameters `contacts` are the index `i` of a contact."""
         outer, self.scalarizer = self.scalarizer, self.new_scalarizer(dict.fromkeys(contacts, i))
-        pairs = pair_rates([(argument.arg, argument.annotation) for argument in node.args.args])
-        self.scalarizer.states_of_rates |= {rates: ast.Name(states) for rates, states in pairs.items()}
+        self.scalarizer.single_values = names_with_one_value(node)
         names = []
         for argument in node.args.args:
             if self.has_vectors and (kind := annotated_kind(argument)):
                 self.scalarizer.vector_kinds[argument.arg] = kind
-                names += [ast.unparse(term) for term in self.scalarizer.own_components(ast.Name(argument.arg))]
+                names += [ast.unparse(term) for term in self.scalarizer.components(ast.Name(argument.arg))]
             elif argument.arg not in contacts:
                 names.append(argument.arg)
         result = replace_fields(node, body=self.lower_block(node.body) or [ast.Pass()])
@@ -159,6 +159,15 @@ class FileLowerer:
     def is_excluded(self, node: ast.expr) -> bool:
         """Return whether this is an excluded item, or its name."""
         return (item_label(node) or self.declared.constants.get(getattr(node, "id", ""))) in self.spec.excluded
+
+
+def names_with_one_value(node: ast.FunctionDef) -> set[str]:
+    """Return the parameters that a function does not change, and the names that one statement of it sets."""
+    stored = [argument.arg for argument in node.args.args]
+    for part in all_nodes(node):
+        for target in part.targets if isinstance(part, ast.Assign) else ():
+            stored += [name.id for name in all_nodes(target) if isinstance(name, ast.Name)]
+    return {name for name, count in Counter(stored).items() if count == 1}
 
 
 def leaves(statements: list[ast.stmt]) -> bool:

@@ -35,7 +35,8 @@ class Scalarizer(ConstantFolder):
         super().__init__(spec, declared.constants)
         self.declared, self.path, self.has_vectors = declared, path, vectors
         self.vector_kinds: dict[str, str] = {}  # vector names -> what they run over
-        self.states_of_rates: dict[str, ast.Name] = {}  # names of rates -> the states at which they are evaluated
+        self.single_values: set[str] = set()  # names of vectors that never change
+        self.copies: dict[str, ast.expr] = {}  # components that are never stored -> the number that they equal
         self.allocated_names: set[str] = set()  # of vectors that are filled by component
         self.loop_indices = dict(index or {})  # loop variables -> current value
         self.scalar_names: set[str] = set()  # names of scalars
@@ -88,32 +89,17 @@ class Scalarizer(ConstantFolder):
         """Return the indices of all components."""
         return range(self.spec.size(kind))
 
-    def states_of(self, node: ast.AST) -> ast.expr | None:
-        """Return the states at which rates are evaluated; None for another vector."""
-        match node:
-            case ast.Name(id=name):
-                return self.states_of_rates.get(name)
-            case ast.Attribute(value=owner, attr=name) if name in self.declared.states_of_rates:
-                return ast.Attribute(owner, self.declared.states_of_rates[name], ast.Load())
-        return None
-
-    def own_indices(self, node: ast.AST, kind: str) -> Sequence[int]:
-        """Return the indices of components stored in the vector itself; rates that are states are stored there."""
-        return self.spec.dynamic_states if self.states_of(node) else self.all_indices(kind)
-
     def component(self, node: ast.expr, place: int) -> ast.expr:
         """Return one component of a vector expression; scalars are rewritten as they are."""
         kind = self.vector_kind(node)
         if kind is None:
             return self.visit(node)
-        if (states := self.states_of(node)) and place in self.spec.kinematic_states:
-            return self.component(states, self.spec.rate_place(place))
         match node:
             case ast.Subscript(value=vector):
                 return ast.Subscript(self.visit(vector), ast.Constant(place), ast.Load())
             case ast.Name(id=vector):
                 name = self.spec.component_name(vector, kind, place)
-                return ast.Constant(0.0) if name in self.known_zeros else ast.Name(name, ast.Load())
+                return ast.Constant(0.0) if name in self.known_zeros else self.copies.get(name) or ast.Name(name)
             case ast.Attribute(value=owner, attr=vector):
                 return ast.Attribute(self.visit(owner), self.spec.component_name(vector, kind, place), ast.Load())
             case ast.BinOp(left=left, op=op, right=right):
@@ -151,16 +137,10 @@ class Scalarizer(ConstantFolder):
             case _:
                 raise self.error(node)
 
-    def own_components(self, node: ast.expr) -> list[ast.expr]:
-        """Return the components stored in an argument, target or result."""
+    def components(self, node: ast.expr) -> list[ast.expr]:
+        """Return the components of a vector, or a scalar."""
         kind = self.vector_kind(node)
-        return [self.component(node, i) for i in self.own_indices(node, kind)] if kind else [self.visit(node)]
-
-    def all_components(self, node: ast.expr) -> list[ast.expr]:
-        """Return all components of a vector, including those stored in another one."""
-        if not (kind := self.vector_kind(node)):
-            raise self.error(node)
-        return [self.component(node, i) for i in self.all_indices(kind)]
+        return [self.component(node, i) for i in self.all_indices(kind)] if kind else [self.visit(node)]
 
     # ---- scalars
 
@@ -223,9 +203,7 @@ class Scalarizer(ConstantFolder):
         result: list[ast.expr] = []
         for part in parts:
             starred = isinstance(part, ast.Starred) and self.vector_kind(part.value)
-            result += (
-                self.all_components(part.value) if isinstance(part, ast.Starred) and starred else [self.visit(part)]
-            )
+            result += self.components(part.value) if isinstance(part, ast.Starred) and starred else [self.visit(part)]
         return result
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -240,13 +218,13 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id="len"), args=[argument]) if kind := self.vector_kind(argument):
                 return ast.Constant(self.spec.size(kind))
             case ast.Call(func=ast.Name(id="sum_of"), args=args):
-                terms = [ast.unparse(term) for argument in args for term in self.all_components(argument)]
+                terms = [ast.unparse(term) for argument in args for term in self.components(argument)]
                 return parse_expression(" + ".join(f"({term})" for term in terms))
             case ast.Call(func=ast.Name(id="all_of" | "any_of" as name), args=[argument]):
-                tests = self.all_components(argument)
+                tests = self.components(argument)
                 return ConstantFolder.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "all_of" else ast.Or(), tests))
             case ast.Call(func=ast.Name(id=name), args=[ast.Name() as argument]) if name in REDUCTIONS:
-                *terms, text = [ast.unparse(term) for term in self.all_components(argument)] or ["inf"]
+                *terms, text = [ast.unparse(term) for term in self.components(argument)] or ["inf"]
                 others = [text]
                 for term in reversed(terms):
                     test = " and ".join(f"{term} {REDUCTIONS[name]} {other}" for other in others)
@@ -268,7 +246,7 @@ class Scalarizer(ConstantFolder):
             for argument in node.args
             if not (isinstance(argument, ast.Name) and argument.id in self.loop_indices)
         ]
-        args = [term for argument in vector_arguments for term in self.own_components(argument)]
+        args = [term for argument in vector_arguments for term in self.components(argument)]
         return replace_fields(
             node, func=self.visit(function), args=args, keywords=[self.visit(keyword) for keyword in node.keywords]
         )
@@ -295,16 +273,22 @@ class Scalarizer(ConstantFolder):
             ):
                 place = ast.Attribute(self.visit(thing), ast.literal_eval(self.method_bindings[name]), ast.Store())
                 return [ast.Assign([place], self.visit(value))]
+            case ast.Return(value=ast.Call() as call) if function_name(call) in self.declared.rates:
+                raise self.error(call)  # a name is needed: see lower_rates
             case ast.Return(value=ast.Tuple(elts=parts)):
-                return [ast.Return(tuple_or_single([term for part in parts for term in self.own_components(part)]))]
+                return [ast.Return(tuple_or_single([term for part in parts for term in self.components(part)]))]
             case ast.Return(value=value) if value and self.vector_kind(value):
                 if self.is_elementwise(value) or not isinstance(value, ast.Call):
-                    return [ast.Return(tuple_or_single(self.own_components(value)))]
+                    return [ast.Return(tuple_or_single(self.components(value)))]
             case ast.Assign(
                 targets=[ast.Tuple(elts=[ast.Name(id=f_t), ast.Name(id=J)])],
                 value=ast.Call(func=ast.Attribute(attr=name)) as call,
             ) if name in self.declared.jacobians:
                 return self.lower_jacobian(f_t, J, call)
+            case ast.Assign(targets=[target], value=ast.Call(func=ast.Attribute(attr=name)) as call) if (
+                name in self.declared.rates
+            ):
+                return self.lower_rates(target, call)
             case ast.Assign(
                 targets=[ast.Name(id=s)],
                 value=ast.Call(func=ast.Name(id="factorize" | "factorize_complex" as name), args=arguments),
@@ -344,8 +328,6 @@ class Scalarizer(ConstantFolder):
                     raise self.error(target_node)
                 self.scalar_names.add(target_node.id)
                 continue
-            if target_node.id in [states.id for states in self.states_of_rates.values()]:
-                raise self.error(target_node)
             if self.vector_kinds.setdefault(target_node.id, kind) != kind:
                 raise self.error(target_node)
 
@@ -353,7 +335,7 @@ class Scalarizer(ConstantFolder):
         """Rewrite an assignment by component; as one tuple assignment where components depend on each other."""
         value, target = node.value, node.targets[0]
         if len(node.targets) > 1:  # self.c1 = self.c2 = 0.0
-            terms = [term for target in node.targets for term in self.own_components(target)]
+            terms = [term for target in node.targets for term in self.components(target)]
             return [ast.Assign(terms, self.visit(value))] if terms else []
         left = target.elts if isinstance(target, ast.Tuple) else [target]
         right = value.elts if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) else [value]
@@ -375,7 +357,7 @@ class Scalarizer(ConstantFolder):
             and not self.is_elementwise(value)
             and (len(left) > 1 or self.vector_kind(value))
         ):
-            return self.lower_unpacking(node, left, value)
+            return self.lower_unpacking(left, value)
         if len(left) != len(right):
             return [self.visit(node)]
         kinds = [
@@ -383,15 +365,11 @@ class Scalarizer(ConstantFolder):
             for target, value in zip(left, right, strict=True)
         ]
         self.record_kinds(left, kinds)
-        self.record_copied_rates(left, right)
-        for target, value in zip(left, right, strict=True):
-            if isinstance(value, ast.Call):
-                self.record_result_rates(node, [target], value)
         if not any(kinds):
             return [self.visit(node)]
         pairs: list[tuple[ast.expr, ast.expr]] = []
         for target, value, kind in zip(left, right, kinds, strict=True):
-            for i in self.own_indices(target, kind) if kind else [-1]:
+            for i in self.all_indices(kind) if kind else [-1]:
                 number = self.component(value, i) if kind else self.visit(value)
                 if isinstance(target, ast.Name) and kind and is_zero(number):
                     self.known_zeros.add(self.spec.component_name(target.id, kind, i))
@@ -410,33 +388,33 @@ class Scalarizer(ConstantFolder):
             changed.add(dotted_name(target))
         return [ast.Assign([target], number) for target, number in pairs]
 
-    def lower_unpacking(self, node: ast.Assign, targets: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
+    def lower_unpacking(self, targets: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
         """Rewrite the unpacking of a function result."""
         kinds = self.result_kinds(value)
         if len(kinds) != len(targets):
             kinds = [None] * len(targets)  # scalars
         self.record_kinds(targets, kinds)
-        self.record_result_rates(node, targets, value)
-        terms = [term for target in targets for term in self.own_components(target)]
+        terms = [term for target in targets for term in self.components(target)]
         return [ast.Assign([tuple_or_single(terms)], self.visit(value))] if terms else [ast.Expr(self.visit(value))]
 
-    def record_result_rates(self, node: ast.stmt, targets: list[ast.expr], call: ast.Call) -> None:
-        """Record at which states a function evaluates the rates that it returns."""
-        for result, place in self.declared.states_of_results.get(function_name(call), {}).items():
-            rates, states = targets[result], targets[place] if place >= 0 else call.args[place]
-            if isinstance(rates, ast.Name) and isinstance(states, ast.Name):
-                if self.states_of_rates.setdefault(rates.id, states).id != states.id:
-                    raise self.error(node)
-            elif isinstance(rates, ast.Name) or not is_same_tree(self.states_of(rates), states):
-                raise self.error(node)
+    def lower_rates(self, f: ast.expr, call: ast.Call) -> list[ast.stmt]:
+        """Rewrite f = model.rates(t, y, modes), which returns the rates that are no states; copy the others from y.
 
-    def record_copied_rates(self, left: Sequence[ast.expr], right: Sequence[ast.expr]) -> None:
-        """Record the states of rates that are copied together with them, as in y, f = step.y0, step.f0."""
-        for rates, value in zip(left, right, strict=True):
-            if isinstance(rates, ast.Name) and (states := self.states_of(value)):
-                copies = (target for target, source in zip(left, right, strict=True) if is_same_tree(source, states))
-                if (copy := next(copies, None)) and isinstance(copy, ast.Name):
-                    self.states_of_rates[rates.id] = copy
+        A copy that no statement changes is not stored: y is read instead.
+        """
+        y = next(argument for argument in call.args if self.vector_kind(argument) == STATES)
+        is_new = isinstance(f, ast.Name) and f.id not in self.vector_kinds
+        is_fixed = is_new and {*names_used(f), *names_used(y)} <= self.single_values
+        self.record_kinds([f], [STATES])
+        computed = [self.component(f, i) for i in self.spec.dynamic_states]
+        statements: list[ast.stmt] = [ast.Assign([tuple_or_single(computed)], self.visit(call))]
+        for i in self.spec.kinematic_states:
+            target, rate = self.component(f, i), self.component(y, self.spec.rate_place(i))
+            if is_fixed:
+                self.copies[dotted_name(target)] = rate
+            else:
+                statements.append(ast.Assign([target], rate))
+        return statements
 
     def lower_jacobian(self, f_t: str, J: str, call: ast.Call) -> list[ast.stmt]:
         """Rewrite f_t, J = model.jacobian(...): the derivatives of each dynamic rate, time first."""

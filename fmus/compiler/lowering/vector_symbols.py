@@ -1,8 +1,8 @@
 """Symbols of the runtime sources by name: vector attributes, results, constants, elementwise functions."""
 
 import ast
-from collections.abc import Iterable, Sequence
-from typing import Any, TypeGuard, TypeVar
+from collections.abc import Iterable
+from typing import Any, TypeGuard
 
 from .. import BuildError
 from ..syntax_trees import all_nodes, parsed_module, parsed_nodes
@@ -16,8 +16,7 @@ ELEMENTWISE = {
 }
 ERROR_SIZE_OF_ANGLE = "1.0 if {0} > 1.0 or {0} < -1.0 else {0} if {0} > 0.0 else -{0}"
 SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates", "complete_rates")
-Key = TypeVar("Key", str, int)
-VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS, "ConditionVector": CONDITIONS}
+VECTOR_KINDS = {"StateVector": STATES, "Rates": STATES, "ContactVector": CONTACTS, "ConditionVector": CONDITIONS}
 
 
 class SourceSymbols:
@@ -25,13 +24,11 @@ class SourceSymbols:
 
     def __init__(self, texts: Iterable[str], vector_operations: str) -> None:
         self.vector_attributes: dict[str, str] = {}
-        self.states_of_rates: dict[str, str] = {}  # attribute with rates -> attribute with their states
         self.constants: dict[str, Any] = {}
         self.elementwise: set[str] = set()
         self.inlined: dict[str, tuple[list[str], ast.expr]] = {}  # parameters and expression
         self.result_kinds: dict[str, list[str | None]] = {}  # of functions that return vectors
-        # of functions that return rates: place of the rates -> place of their states; negative places are arguments
-        self.states_of_results: dict[str, dict[int, int]] = {}
+        self.rates: set[str] = set()  # functions that return rates, without those that are states
         self.jacobians: set[str] = set()  # functions that return the derivatives of the rates
         scalars: dict[str, str] = {}  # attributes without declaration -> a class that has them
         for function in parsed_module(vector_operations).body:
@@ -55,8 +52,6 @@ class SourceSymbols:
                     kind = annotated_kind(part) or ""
                     if self.vector_attributes.setdefault(name, kind) != kind:
                         raise BuildError(f"{node.name} declares {name} as another vector than another class.")
-                pairs = pair_rates([(name, part.annotation) for name, part in declared.items()])
-                self.states_of_rates |= pairs
                 scalars |= dict.fromkeys(names - declared.keys(), node.name)
                 prefixes = tuple(f"{name}_" for name in declared)
                 if name := min((name for name in names - declared.keys() if name.startswith(prefixes)), default=""):
@@ -70,14 +65,12 @@ class SourceSymbols:
 
     def read_results(self, node: ast.FunctionDef) -> None:
         """Collect the results of a function."""
-        if isinstance(node.returns, ast.Name) and node.returns.id == "Derivatives":
+        if type_name(node.returns) == "Derivatives":
             self.jacobians.add(node.name)
+        if type_name(node.returns) == "Rates":
+            self.rates.add(node.name)
         if kinds := annotated_results(node):
             self.result_kinds[node.name] = kinds
-            arguments = [argument for argument in node.args.args if argument.arg != "self"]
-            types = [(n - len(arguments), argument.annotation) for n, argument in enumerate(arguments)]
-            pairs = pair_rates([*types, *enumerate(result_types(node))])
-            self.states_of_results[node.name] = {rates: states for rates, states in pairs.items() if rates >= 0}
 
     def read_file(self, node: ast.Module) -> None:
         """Collect the constants of a file."""
@@ -131,21 +124,6 @@ def result_types(node: ast.FunctionDef) -> list[ast.expr | None]:
 def type_name(annotation: ast.expr | None) -> str:
     """Return the name of a simple type, else ""."""
     return annotation.id if isinstance(annotation, ast.Name) else ""
-
-
-def pair_rates(types: Sequence[tuple[Key, ast.expr | None]]) -> dict[Key, Key]:
-    """Return for each RateVector the StateVector declared last before it."""
-    result, states = {}, None
-    for key, annotation in types:
-        if type_name(annotation) == "StateVector":
-            states = key
-        elif type_name(annotation) == "RateVector":
-            if states is None:
-                raise BuildError(
-                    f"The RateVector {key} follows no StateVector; write StateVector to store it as a whole."
-                )
-            result[key] = states
-    return result
 
 
 def item_label(node: ast.AST) -> str:
