@@ -15,6 +15,7 @@
 #include <string.h>
 
 enum { REACHED, EVENT, GRAZE, STEP_EVENT, TERMINATED, FAILED, TOO_MANY_STEPS };
+enum { TUNABLE = 1, FIXED };
 enum { WARNING = 1, STAGES = 12, EXTRA = 3, DENSE = 7, SAMPLES = 8, SECTIONS = 60, HALVINGS = 200, LEVELS = 6 };
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 6.0, FLOOR = 1e-6, FLOOR_S = 1e-4, SMALL = 1e-3, CLEAR = 1e-5, GOLDEN = 0.6180339887498949;
 static const double FAR = 1e50; /* an indicator as large as this stands for no event */
@@ -28,7 +29,16 @@ typedef struct { /* a parameter, or the factor of a driven input, or the start v
     size_t width, element; /* number of its values and which of them is meant; width 0 if it enters no equation */
     int64_t input;         /* index of the driven input, or -1 */
     double value;          /* 0 if unknown */
+    double *all;           /* the values of its array */
+    int64_t kind, side;    /* TUNABLE or FIXED if it is set; see `Known.side` */
+    double change;         /* of FIXED ones, of which runs are saved at the start: without it, and with 1/2, 1, -1/2, -1 */
+    void *starts[5];
 } Parameter;
+
+typedef struct { /* an integer, which may be one of an array */
+    Reference reference;
+    size_t width, element;
+} Element;
 
 typedef struct {
     Instance instance;
@@ -49,6 +59,16 @@ typedef struct {
     double *values;
     int64_t indicator;
     bool is_fresh; /* the first stage and the indicators belong to the present point */
+    /* events, see variational_events.c */
+    Function update, enter_event, enter_continuous, get_states, get_mode, save, restore, release; /* the last may be NULL */
+    const Reference *influenced; /* rates and outputs */
+    const Element *modes;
+    size_t n_influenced, n_modes, n_signals;
+    const double *signals;                 /* of inputs: time and values (n_signals, 1 + n_inputs) */
+    double duration, tolerance, next_event, row, last_t; /* times in s: next event that the FMU sets, next of `signals` */
+    size_t n_at_once, capacity, capacity_notes, n_events, n_notes, n_splits; /* of the logs */
+    double *event_values, *note_values, *split_values;
+    int64_t *event_codes, *note_codes;
 } Run;
 
 static bool read(const Run *run, const Reference *references, size_t n, double *values)
@@ -138,17 +158,32 @@ static bool begin(Run *run)
     return run->is_fresh;
 }
 
+/* Sum of the first `count` components of `stages` stages with the weights of a row; several components at once. */
+static void combine(const Run *run, const double *row, size_t stages, size_t count, double *sum)
+{
+    size_t n = run->n * (1 + run->m), j = 0;
+    for (; j + 4 <= count; j += 4) {
+        double a = 0.0, b = 0.0, c = 0.0, d = 0.0;
+        for (size_t l = 0; l < stages; l++) {
+            const double *k = run->k + l * n + j;
+            a += row[l] * k[0], b += row[l] * k[1], c += row[l] * k[2], d += row[l] * k[3];
+        }
+        sum[j] = a, sum[j + 1] = b, sum[j + 2] = c, sum[j + 3] = d;
+    }
+    for (; j < count; j++) {
+        double a = 0.0;
+        for (size_t l = 0; l < stages; l++) a += row[l] * run->k[l * n + j];
+        sum[j] = a;
+    }
+}
+
 /* One step of size h from the present point, for the states and m parameters: stages k and the result z1. */
 static bool step(Run *run, double h, size_t m)
 {
     size_t n = run->n * (1 + run->m), count = run->n * (1 + m);
     for (size_t s = 1; s <= STAGES; s++) {
-        const double *row = s < STAGES ? run->a + s * STAGES : run->b;
-        for (size_t j = 0; j < count; j++) {
-            double sum = 0.0;
-            for (size_t l = 0; l < s; l++) sum += row[l] * run->k[l * n + j];
-            run->z1[j] = run->z[j] + h * sum;
-        }
+        combine(run, s < STAGES ? run->a + s * STAGES : run->b, s, count, run->z1);
+        for (size_t j = 0; j < count; j++) run->z1[j] = run->z[j] + h * run->z1[j];
         if (!evaluate(run, run->t + (s < STAGES ? run->c[s] : 1.0) * h, run->z1, run->k + s * n, m)) return false;
     }
     return true;
@@ -189,11 +224,8 @@ static bool prepare_dense(Run *run, double h)
     size_t n = run->n * (1 + run->m);
     for (size_t s = 0; s < EXTRA; s++) {
         double *z = run->dense;
-        for (size_t j = 0; j < n; j++) {
-            double sum = 0.0;
-            for (size_t l = 0; l <= STAGES + s; l++) sum += run->a_extra[s * 16 + l] * run->k[l * n + j];
-            z[j] = run->z[j] + h * sum;
-        }
+        combine(run, run->a_extra + s * 16, STAGES + s + 1, n, z);
+        for (size_t j = 0; j < n; j++) z[j] = run->z[j] + h * z[j];
         if (!evaluate(run, run->t + run->c_extra[s] * h, z, run->k + (STAGES + 1 + s) * n, run->m)) return false;
     }
     for (size_t j = 0; j < n; j++) {
@@ -201,11 +233,10 @@ static bool prepare_dense(Run *run, double h)
         run->dense[j] = change;
         run->dense[n + j] = h * first - change;
         run->dense[2 * n + j] = 2.0 * change - h * (first + last);
-        for (size_t i = 0; i < 4; i++) {
-            double sum = 0.0;
-            for (size_t l = 0; l < 16; l++) sum += run->d[i * 16 + l] * run->k[l * n + j];
-            run->dense[(3 + i) * n + j] = h * sum;
-        }
+    }
+    for (size_t i = 3; i < DENSE; i++) {
+        combine(run, run->d + (i - 3) * 16, 16, n, run->dense + i * n);
+        for (size_t j = 0; j < n; j++) run->dense[i * n + j] *= h;
     }
     return true;
 }
@@ -222,14 +253,18 @@ static void dense_at(const Run *run, double share, size_t count, double *z)
 }
 
 /* Write the outputs and their derivatives at a time. */
-bool record(Run *run, double t, const double *z)
+static bool read_outputs(Run *run, double t, const double *z, double *values)
 {
     size_t n = run->n, r = run->r, m = run->m;
-    double *values = run->values + run->next++ * r * (1 + m);
     bool ok = set_point(run, t, z) && read(run, run->outputs, r, values);
     for (size_t i = 0; i < m && ok; i++)
         ok = tangent(run, run->outputs, r, i, t, z + n * (1 + i), values + r * (1 + i));
     return ok;
+}
+
+static bool record(Run *run, double t, const double *z)
+{
+    return read_outputs(run, t, z, run->values + run->next++ * run->r * (1 + run->m));
 }
 
 static double indicator_at(Run *run, double h, double share, size_t k)
@@ -386,7 +421,7 @@ static int complete_step(Run *run)
 }
 
 /* Integrate to a time, or to the first event, whose indicator is in run->indicator then. */
-int advance(Run *run, double target)
+static int advance(Run *run, double target)
 {
     size_t n = run->n * (1 + run->m), failures = 0;
     if (!begin(run)) return FAILED;
@@ -461,7 +496,7 @@ static bool set_parameter(const Run *run, size_t i, double *all, double sum)
 
 /* Indicator k at the present point, with the states moved by e along their change by parameter i, or, for i = m, along
  * the motion, in continuous-time mode; with `all`, the values of its array, parameter i is moved instead, in event mode. */
-double moved_indicator(Run *run, size_t k, size_t i, double e, const double *rates, double *all)
+static double moved_indicator(Run *run, size_t k, size_t i, double e, const double *rates, double *all)
 {
     size_t n = run->n;
     double *y = run->dense;
@@ -479,7 +514,7 @@ double moved_indicator(Run *run, size_t k, size_t i, double e, const double *rat
 
 /* Derivative of indicator k along such a move: the limit of differences over e, e/2, ... by extrapolation (Ridders).
  * `sides` is 0 for central differences, and 1 or -1 for one-sided ones. */
-double indicator_slope(Run *run, size_t k, size_t i, double e, int sides, const double *rates, double *all)
+static double indicator_slope(Run *run, size_t k, size_t i, double e, int sides, const double *rates, double *all)
 {
     double table[LEVELS][LEVELS], best = NAN, least = INFINITY, base = moved_indicator(run, k, i, 0.0, rates, all);
     for (size_t level = 0; level < LEVELS; level++, e *= 0.5) {
