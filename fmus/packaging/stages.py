@@ -2,9 +2,8 @@
 
 1-declared.py       the model file
 2-analysis.txt      the expressions that its equations build, and what the structural analysis derives from them
-3-model.py          the generated class of scalars
-4-lowered/          this class and the numerics, lowered to the states of the model
-5-c/                the same as C, with the FMI functions
+3-lowered/          the generated class of scalars, and the numerics, lowered to the states of the model
+4-c/                the same as C, with the FMI functions
 """
 
 from collections.abc import Iterator, Sequence
@@ -41,10 +40,9 @@ def write_stages(source: ModelFile, folder: Path, methods: Sequence[str] = (), l
     texts = {
         "1-declared.py": source.source,
         "2-analysis.txt": "\n".join([*expression_lines(source.analysis), "", *analysis_lines(source.analysis), ""]),
-        "3-model.py": source.generated_source,
     }
-    texts |= {f"4-lowered/{path}": text for path, text in lowered_files(source, features).items()}
-    texts |= {f"5-c/{name}": text for name, text in collect_sources(lowered_model(source, features), "2").items()}
+    texts |= {f"3-lowered/{path}": text for path, text in lowered_files(source, features).items()}
+    texts |= {f"4-c/{name}": text for name, text in collect_sources(lowered_model(source, features), "2").items()}
     for name, text in texts.items():
         path = folder / source.name / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -38,27 +38,22 @@ position_index: list[int] = []
 is_planar: list[bool] = []
 
 
+def elementwise(function):
+    """Apply a function of scalars element by element."""
+    return function
+
+
+def inlined(function):
+    """Mark a function that returns one expression, which replaces its calls at build time, for each element."""
+    return function
+
+
 def state_vector() -> StateVector:
     """Return a vector over the states, to be filled."""
 
 
 def contact_vector() -> ContactVector:
     """Return a vector over the contacts, to be filled."""
-
-
-def magnitude(a):
-    """Return the magnitudes."""
-
-
-def error_size(a):
-    """Return the magnitudes to which the errors of states are relative: of angles at most 1 rad.
-
-    Whole revolutions of an angle that enters the equations by periodic functions only do not change the motion.
-    """
-
-
-def elementwise_max(a, b):
-    """Return the larger element of two vectors."""
 
 
 def max_of(a):
@@ -81,6 +76,31 @@ def any_of(a):
     """Return whether any element is true."""
 
 
+def select_angles(a, b):
+    """Take `a` for angles that enter the equations by periodic functions only, and `b` for the other states."""
+
+
+@inlined
+def magnitude(a):
+    """Return the magnitudes."""
+    return a if a > 0.0 else -a
+
+
+@inlined
+def elementwise_max(a, b):
+    """Return the larger elements of two vectors."""
+    return a if a > b else b
+
+
+@inlined
+def error_size(a):
+    """Return the magnitudes to which the errors of states are relative: of angles at most 1 rad.
+
+    Whole revolutions of an angle do not change the motion.
+    """
+    return select_angles(1.0 if a > 1.0 or a < -1.0 else magnitude(a), magnitude(a))
+
+
 def select_kinematic(a, b):
     """Take `a` for states whose rate is a state and `b` for the others."""
 
@@ -95,16 +115,6 @@ def kinematic_rates(y):
 
 def complete_rates(y: StateVector, others) -> StateVector:
     """Return the rates at y: those that are states from y, the others from a vector."""
-
-
-def elementwise(function):
-    """Apply a function of scalars element by element."""
-    return function
-
-
-def inlined(function):
-    """Mark a function of vectors that returns one expression; its calls are replaced by it at build time."""
-    return function
 
 
 def multiply(J, a: StateVector) -> StateVector:

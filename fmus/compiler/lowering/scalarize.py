@@ -2,14 +2,15 @@
 
 import ast
 from collections.abc import Mapping, Sequence
+from functools import reduce
 
 from ..syntax_trees import TranslationError, TreeTransformer, all_nodes, is_same_tree, replace_fields
 from .constant_folding import ConstantFolder
 from .elimination import LoweredSystem, tuple_or_single
 from .layout import CONDITIONS, STATES, ModelLayout
-from .vector_symbols import ELEMENTWISE, ERROR_SIZE_OF_ANGLE, SELECTIONS, SourceSymbols, annotated_kind
+from .vector_symbols import SELECTIONS, SourceSymbols, annotated_kind
 
-REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
+REDUCTIONS: dict[str, ast.cmpop] = {"max_of": ast.Gt(), "min_of": ast.Lt()}  # reductions to one component
 ALLOCATORS = ("state_vector", "contact_vector")
 LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices", "planar_indices")  # iterables of loops
 METHOD_LOOP = "methods"  # iterable of (label, module, class)
@@ -72,11 +73,13 @@ class Scalarizer(ConstantFolder):
                 return result.pop() if result else None
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return self.vector_kind(operand)
+            case ast.IfExp(test=test) | ast.BoolOp(values=[test, *_]):
+                return self.vector_kind(test)
         return None
 
     def is_elementwise(self, node: ast.AST) -> bool:
         """Return whether a call works on vectors component by component."""
-        names = {*ELEMENTWISE, *self.declared.elementwise, *self.declared.inlined, *SELECTIONS}
+        names = {*self.declared.elementwise, *self.declared.inlined, *SELECTIONS}
         return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
 
     def result_kinds(self, call: ast.Call) -> list[str | None]:
@@ -114,6 +117,12 @@ class Scalarizer(ConstantFolder):
                     raise self.error(node)
                 arguments = dict(zip(parameters, args, strict=True))
                 return self.component(Substitution(arguments).visit(expression), place)
+            case ast.IfExp(test=test, body=body, orelse=other):
+                return ast.IfExp(*(self.component(part, place) for part in (test, body, other)))
+            case ast.BoolOp(op=operator, values=values):
+                return ast.BoolOp(operator, [self.component(value, place) for value in values])
+            case ast.Call(func=ast.Name(id="select_angles"), args=[angle, other]):
+                return self.component(angle if place in self.spec.angle_states else other, place)
             case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
                 return self.component(other if place in self.spec.dynamic_states else moved, place)
             case ast.Call(func=ast.Name(id="complete_rates"), args=[states, others]):
@@ -123,15 +132,6 @@ class Scalarizer(ConstantFolder):
                 return self.component(argument, place) if place in self.spec.dynamic_states else ast.Constant(0.0)
             case ast.Call(func=ast.Name(id="kinematic_rates"), args=[argument]):
                 return self.component(argument, self.spec.rate_place(place))
-            case ast.Call(func=ast.Name(id=name), args=args) if name in ELEMENTWISE:
-                if not all(isinstance(argument, (ast.Name, ast.Attribute)) for argument in args):
-                    raise self.error(node)
-                template = ELEMENTWISE[name]
-                if name == "error_size" and place in self.spec.angle_states:
-                    template = ERROR_SIZE_OF_ANGLE
-                return parse_expression(
-                    template.format(*(ast.unparse(self.component(argument, place)) for argument in args))
-                )
             case ast.Call(func=function, args=args) if self.is_elementwise(node):
                 return ast.Call(function, [self.component(argument, place) for argument in args], [])
             case _:
@@ -146,7 +146,7 @@ class Scalarizer(ConstantFolder):
 
     def bind_method(self, target: ast.expr, label: str) -> None:
         """Bind the loop variables label, module and class to one method."""
-        parts = ast.Constant(label), ast.Name(label), parse_expression(f"{label}.{self.spec.methods[label]}")
+        parts = ast.Constant(label), ast.Name(label), ast.Attribute(ast.Name(label), self.spec.methods[label])
         assert isinstance(target, ast.Tuple)
         self.method_bindings = {getattr(name, "id", ""): part for name, part in zip(target.elts, parts, strict=True)}
 
@@ -218,19 +218,19 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id="len"), args=[argument]) if kind := self.vector_kind(argument):
                 return ast.Constant(self.spec.size(kind))
             case ast.Call(func=ast.Name(id="sum_of"), args=args):
-                terms = [ast.unparse(term) for argument in args for term in self.components(argument)]
-                return parse_expression(" + ".join(f"({term})" for term in terms))
+                return sum_of_terms([term for argument in args for term in self.components(argument)])
             case ast.Call(func=ast.Name(id="all_of" | "any_of" as name), args=[argument]):
                 tests = self.components(argument)
                 return ConstantFolder.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "all_of" else ast.Or(), tests))
             case ast.Call(func=ast.Name(id=name), args=[ast.Name() as argument]) if name in REDUCTIONS:
-                *terms, text = [ast.unparse(term) for term in self.components(argument)] or ["inf"]
-                others = [text]
+                *terms, result = self.components(argument) or [ast.Name("inf")]
+                others = [result]
                 for term in reversed(terms):
-                    test = " and ".join(f"{term} {REDUCTIONS[name]} {other}" for other in others)
-                    text = f"{term} if {test} else {text}"
+                    comparisons: list[ast.expr] = [ast.Compare(term, [REDUCTIONS[name]], [other]) for other in others]
+                    test = ast.BoolOp(ast.And(), comparisons) if len(comparisons) > 1 else comparisons[0]
+                    result = ast.IfExp(test, term, result)
                     others.insert(0, term)
-                return parse_expression(text)
+                return result
         function = node.func
         contacts = [
             argument.id for argument in node.args if isinstance(argument, ast.Name) and argument.id in self.loop_indices
@@ -445,7 +445,7 @@ class Scalarizer(ConstantFolder):
                 ]
             terms = [term for term in terms if not is_zero(term)]
             if terms:
-                statements.append(ast.Assign([ast.Name(name)], parse_expression(" + ".join(map(ast.unparse, terms)))))
+                statements.append(ast.Assign([ast.Name(name)], sum_of_terms(terms)))
             else:
                 self.known_zeros.add(name)
         return statements
@@ -461,9 +461,9 @@ def function_name(call: ast.Call) -> str:
     return getattr(call.func, "attr", getattr(call.func, "id", ""))
 
 
-def parse_expression(text: str) -> ast.expr:
-    """Parse an expression."""
-    return ast.parse(text, mode="eval").body
+def sum_of_terms(terms: list[ast.expr]) -> ast.expr:
+    """Return the sum of some terms, in order."""
+    return reduce(lambda left, right: ast.BinOp(left, ast.Add(), right), terms)
 
 
 def names_used(node: ast.AST) -> set[str]:

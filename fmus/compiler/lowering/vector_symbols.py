@@ -8,14 +8,7 @@ from .. import BuildError
 from ..syntax_trees import all_nodes, parsed_module, parsed_nodes
 from .layout import CONDITIONS, CONTACTS, STATES
 
-# functions of vectors, component by component: to scalars; by the kind of rates
-ELEMENTWISE = {
-    "magnitude": "{0} if {0} > 0.0 else -{0}",
-    "elementwise_max": "{0} if {0} > {1} else {1}",
-    "error_size": "{0} if {0} > 0.0 else -{0}",
-}
-ERROR_SIZE_OF_ANGLE = "1.0 if {0} > 1.0 or {0} < -1.0 else {0} if {0} > 0.0 else -{0}"
-SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates", "complete_rates")
+SELECTIONS = ("select_angles", "select_kinematic", "dynamic_part", "kinematic_rates", "complete_rates")
 VECTOR_KINDS = {"StateVector": STATES, "Rates": STATES, "ContactVector": CONTACTS, "ConditionVector": CONDITIONS}
 
 
@@ -33,7 +26,7 @@ class SourceSymbols:
         scalars: dict[str, str] = {}  # attributes without declaration -> a class that has them
         for function in parsed_module(vector_operations).body:
             if isinstance(function, ast.FunctionDef):
-                self.read_results(function)
+                self.read_node(function, scalars)
         for text in texts:
             self.read_file(parsed_module(text))
             for node in parsed_nodes(text):
