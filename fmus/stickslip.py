@@ -16,7 +16,7 @@ class Stickslip(Model):
     m = Parameter(12.5, "kg", "mass of the sled", above=0.0)
     k = Parameter(742.5, "N/m", "spring stiffness", low=0.0)
     mu_s = Parameter(0.9, "1", "coefficient of static friction", low=0.0)
-    mu_d = Parameter(0.6, "1", "coefficient of sliding friction", low=0.0, alias="mu_k")
+    mu_d = Parameter(0.6, "1", "coefficient of sliding friction", low=0.0)
     g = Parameter(9.81, "m/s2", "gravitational acceleration", low=0.0)
     v_driver = Parameter(0.034, "m/s", "speed of the driver")
     eps = Parameter(1e-7, "m/s", "speed below which the threshold law holds the sled", above=0.0)

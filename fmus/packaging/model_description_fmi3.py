@@ -77,8 +77,6 @@ def describe(
             parent.append(element)
             if array_name(meaning):
                 _make_array(element, declared[reference : reference + references.count(reference)])
-        if meaning.alias:
-            SubElement(element, "Alias", name=meaning.alias, description=meaning.text)
     shared.mark_states(elements, model, rates, nominals, first=0)
     _add_structure(root, model, declared, rates)
     return shared.serialize(root, "instantiationToken", code, date)

@@ -40,7 +40,7 @@ class VariableDeclaration:
     high: float = inf
     above: float = -inf
     below: float = inf
-    display = alias = ""
+    display = ""
 
     def __init__(self, unit: str, text: str, **options: Any) -> None:
         self.name = ""

@@ -168,16 +168,6 @@ WRONG = {
         16,
         "Output has no argument hi, the nearest is high: write Output(unit, text, expression, rate_of=",
     ),
-    "an alias of what is calculated": (
-        RATE.replace("rate_of=v", 'rate_of=v, alias="b"'),
-        16,
-        "Output has no argument alias: write Output(unit, text, expression, rate_of=",
-    ),
-    "an alias that is a name": (
-        RATE + '    q = Parameter(1.0, "kg", "mass", alias="m")\n',
-        17,
-        "q has the alias 'm': it must be an identifier that nothing else uses",
-    ),
     "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is invalid: it must be a number above 0"),
     "a broken rule": (
         RATE + '    rules = Rule(k + k > k, "k = {k!r} is too much")\n',

@@ -54,7 +54,7 @@ def is_known(variable):
 def situations(description, count):
     """Yield the choices, in all combinations, and values of Real parameters and inputs around those of the model."""
     draw = Random(description.modelName)
-    variables = [v for v in description.modelVariables if getattr(v, "alias", None) is None]
+    variables = description.modelVariables
     choices = {
         v.valueReference: [int(item.value) for item in v.declaredType.items]
         for v in variables

@@ -43,7 +43,7 @@ def variables(path):
     """Read every variable before and after setting it."""
     with instance(path) as (fmu, description, _):
         starts, after = {}, {}
-        declared = [variable for variable in description.modelVariables if variable.alias is None]
+        declared = description.modelVariables
         for variable in declared:
             starts[variable.name] = repr(read(fmu, variable))
         for variable in declared:

@@ -1,11 +1,9 @@
 """Contents and description of FMI 3.0 FMUs: correct and reproducible."""
 
-import json
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
 
-import commands
 import fmi3_fixtures
 import fmpy
 import numpy as np
@@ -92,7 +90,7 @@ def test_one_fmu_offers_model_exchange_and_co_simulation(fmu, name):
 @EVERY_MODEL
 def test_declared_variables_keep_their_references_and_attributes(fmu, fmus, name):
     two = read_model_description(fmus / f"{name}.fmu").modelVariables
-    three = [item for item in read_model_description(fmu(name)).modelVariables if item.alias is None]
+    three = read_model_description(fmu(name)).modelVariables
     for variable, as_before in zip(three, two, strict=False):
         for key in ("name", "valueReference", "description", "causality", "variability", "initial", "start"):
             assert getattr(variable, key) == getattr(as_before, key)
@@ -101,19 +99,6 @@ def test_declared_variables_keep_their_references_and_attributes(fmu, fmus, name
         assert variable.type == TYPES[as_before.type]
     assert [variable.name for variable in three[len(two) :]] == additional_names(name)
     assert [variable.valueReference for variable in three] == list(range(len(three)))
-
-
-def test_an_alias_is_a_second_name_of_a_settable_variable(fmu, tmp_path):
-    """It is in the XML, importers can set it, and the provenance of a run lists both names."""
-    sled = fmu("stickslip")
-    (one,) = [item for item in read_model_description(sled).modelVariables if item.name == "mu_k"]
-    assert one.alias.name == "mu_d"
-    runs = [simulate_fmu(str(sled), start_values=values).tobytes() for values in ({"mu_k": 0.4}, {"mu_d": 0.4}, {})]
-    assert runs[0] == runs[1] != runs[2]
-    done = commands.harness(tmp_path, "run", sled, "--set", "mu_k=0.4", "--stop", "1")
-    assert done.returncode == 0, done.stderr
-    parameters = json.loads((tmp_path / "results" / "stickslip" / "provenance.json").read_text())["parameters"]
-    assert (parameters["mu_d"]["value"], parameters["mu_k"]["value"]) == (0.4, 0.4)
 
 
 @EVERY_MODEL

@@ -18,7 +18,6 @@ from .expressions import (
 )
 from .model_declaration import OPTIONS, Choice, Contact, Output, SettableVariable, Variable
 from .model_roles import ModelRoles
-from .reserved_names import RESERVED
 
 LARGEST_FLOAT = float_info.max
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
@@ -46,7 +45,6 @@ def check_declarations(analysis: ModelRoles) -> None:
                     raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {analysis.name}", e.location)
             _check_choices(e, parts)
         _check_variable(analysis, e)
-        _check_alias(analysis, e)
     for mode in analysis.modes:
         owners = [c for c in analysis.contacts if c.mode is mode]
         if len(owners) != 1:
@@ -131,15 +129,6 @@ def _check_variable(analysis: ModelRoles, e: Variable) -> None:
         )
     if isinstance(e, SettableVariable) and not e.accepts(e.start):
         raise ModelError(f"{e.label} has the start value {e.start!r}; it must be {e.allowed}", e.location)
-
-
-def _check_alias(analysis: ModelRoles, e: Variable) -> None:
-    """Check that the alias is an identifier that nothing else uses."""
-    names = [word for variable in analysis.declared for word in (variable.name, variable.alias)]
-    if e.alias and (not e.alias.isidentifier() or names.count(e.alias) > 1 or e.alias in RESERVED):
-        raise ModelError(
-            f"{e.name} has the alias {e.alias!r}: it must be an identifier that nothing else uses", e.location
-        )
 
 
 def _check_printable(name: str, location: tuple[str, int], *words: str) -> None:

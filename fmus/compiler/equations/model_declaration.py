@@ -7,7 +7,7 @@ from inspect import Parameter as Argument
 from inspect import Signature, cleandoc, signature
 from linecache import getline
 from types import FunctionType, ModuleType
-from typing import Annotated, Any, ClassVar, NamedTuple, TypedDict, Unpack, get_args, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, TypedDict, Unpack, get_type_hints
 
 from ...runtime.variable_declarations import VariableDeclaration, exported_name
 from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location, describe, is_comparison
@@ -19,19 +19,13 @@ OPTIONS_ENTRY = "**options\n    See the table of options."  # of docstrings
 
 
 class Options(TypedDict, total=False):
-    """Options of calculated variables: type, meaning and, for some, the attribute of a Real in the XML."""
+    """Options of variables: type, meaning and, for some, the attribute of a Real in the XML."""
 
     low: Annotated[float, "Inclusive lower bound."]
     high: Annotated[float, "Inclusive upper bound."]
     above: Annotated[float, "Exclusive lower bound."]
     below: Annotated[float, "Exclusive upper bound."]
     display: Annotated[str, 'Display unit, such as "deg".', "displayUnit"]
-
-
-class SettableOptions(Options, total=False):
-    """Options of parameters and inputs."""
-
-    alias: Annotated[str, "Alternative name, exported in FMI 3.0; of parameters and inputs only."]
 
 
 class Option(NamedTuple):
@@ -44,7 +38,7 @@ class Option(NamedTuple):
 
 OPTIONS = {
     name: Option(hint.__origin__, *hint.__metadata__)
-    for name, hint in get_type_hints(SettableOptions, include_extras=True).items()
+    for name, hint in get_type_hints(Options, include_extras=True).items()
 }
 
 
@@ -65,18 +59,15 @@ class Variable(Expression, VariableDeclaration):
     def __init_subclass__(cls) -> None:
         """Name the single options instead of **options in the signature and the docstring, which help() shows."""
         _, *arguments = signature(cls.__init__).parameters.values()
-        options = {}
         if arguments[-1].name == "options":
-            (table,) = get_args(arguments.pop().annotation)
-            options = {name: OPTIONS[name] for name in get_type_hints(table)}
-        arguments += [Argument(name, Argument.KEYWORD_ONLY, default=None) for name in options]
+            arguments[-1:] = [Argument(name, Argument.KEYWORD_ONLY, default=None) for name in OPTIONS]
         cls.__signature__ = Signature(arguments)
-        texts = "\n".join(f"{name}\n    {option.text}" for name, option in options.items())
+        texts = "\n".join(f"{name}\n    {option.text}" for name, option in OPTIONS.items())
         cls.__doc__ = cleandoc(cls.__doc__ or "").replace(OPTIONS_ENTRY, texts)
 
-    def __init__(self, unit: str, text: str, **options: Unpack[SettableOptions]) -> None:
+    def __init__(self, unit: str, text: str, **options: Unpack[Options]) -> None:
         for word in options:
-            if word not in signature(type(self)).parameters:
+            if word not in OPTIONS:
                 raise TypeError(f"{type(self).__name__}() got an unexpected keyword argument {word!r}")
         texts = {word: value for word, value in options.items() if OPTIONS[word].type is str}
         for word, value in {"unit": unit, "text": text, **texts}.items():
@@ -100,7 +91,7 @@ class Variable(Expression, VariableDeclaration):
 class SettableVariable(Variable):
     """A variable with a value that the user or another FMU sets."""
 
-    def __init__(self, start: float, unit: str, text: str, **options: Unpack[SettableOptions]) -> None:
+    def __init__(self, start: float, unit: str, text: str, **options: Unpack[Options]) -> None:
         Variable.__init__(self, unit, text, **options)
         self.start = start
 
@@ -166,7 +157,7 @@ class Input(SettableVariable):
         unit: str,
         text: str,
         rate: Operand = None,
-        **options: Unpack[SettableOptions],
+        **options: Unpack[Options],
     ) -> None:
         SettableVariable.__init__(self, start, unit, text, **options)
         self.declared_rate: Operand = None if rate is None else as_operand(rate)

@@ -6,7 +6,7 @@ import { formatNumber, formatValue } from "./numbers.js";
 import { buildPanels } from "./panels.js";
 import { Scene } from "./scene.js";
 import { chooseForComparison, chooseItem, comparisonSettings, decodeState, defaultState, effectiveValues, encodeState, findVariable, initialComparison, settableVariables } from "./state.js";
-import { costTable, decayTable, describeSettings, eventTable } from "./tables.js";
+import { costTable, describeSettings, eventTable } from "./tables.js";
 
 const SUMMARY_DELAY = 300; // ms without a change before link and status are updated
 const SOLVER_LISTS = { // id: variable, label, label for the comparison run
@@ -207,7 +207,7 @@ export class Explore extends Scene {
   }
 
   drawResults() {
-    const tables = this.runs.main.time.length ? [costTable, decayTable, eventTable].map((table) => table(this)) : [];
+    const tables = this.runs.main.time.length ? [costTable, eventTable].map((table) => table(this)) : [];
     $$("tables").replaceChildren(...tables.filter(Boolean));
   }
 

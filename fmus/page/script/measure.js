@@ -1,5 +1,4 @@
-// Measurements on runs: turning points, decay and differences. References, as in the harness: Thomson,
-// Theory of Vibration, sections 2.6 and 2.7; for the friction from energy, Liang and Feeny, Nonlinear Dynamics 46 (2006).
+// Turning points of a run, and the difference between two runs.
 
 // The points {t, x} where the speed changes sign or becomes zero, with cubic Hermite interpolation between rows. A start
 // at rest counts if the motion starts immediately.
@@ -42,21 +41,6 @@ function turningPosition(h, rise, v0, v1) {
 function cubic(s, h, x0, x1, v0, v1) {
   const r = 1 - s;
   return (1 + 2 * s) * r * r * x0 + s * r * r * h * v0 + s * s * (3 - 2 * s) * x1 - s * s * r * h * v1;
-}
-
-// Logarithmic decrement, damping ratio and loss per cycle of a decay from x_0 to x_n; null if there is no decay.
-export function decayBetween(x_0, x_n, cycles) {
-  if (!(x_0 > x_n && x_n > 0)) return null;
-  const delta = Math.log(x_0 / x_n) / cycles;
-  return { delta, zeta: delta / Math.sqrt(4 * Math.PI ** 2 + delta ** 2), loss: (x_0 - x_n) / cycles };
-}
-
-// The mean friction force between turning points: the energy lost divided by the distance travelled.
-export function frictionFromEnergy(run, body, energy, turning) {
-  const [from, to] = [turning[0], turning.at(-1)];
-  let distance = 0;
-  for (let i = 1; i < turning.length; i++) distance += Math.abs(turning[i].x - turning[i - 1].x);
-  return distance > 0 ? (run.at(energy, from.t) - run.at(energy, to.t)) / distance : NaN;
 }
 
 // The differences of an output between two runs at common grid points, and the largest magnitude.

@@ -2,7 +2,7 @@
 
 import { makeElement } from "./controls.js";
 import { COUNTS } from "./fmu.js";
-import { decayBetween, difference, frictionFromEnergy, turningPoints } from "./measure.js";
+import { difference } from "./measure.js";
 import { formatNumber, formatScientific, formatValue } from "./numbers.js";
 import { effectiveValues } from "./state.js";
 
@@ -49,31 +49,6 @@ export function costTable({ runs: { main, comparison, reference }, body }) {
     rows.push(...[body.position, body.speed].map((name) => [`largest difference in ${name}`, "", largest(main, comparison, name)]));
   }
   return table("Cost and accuracy", ["", ...runs.map(describeSettings)], rows);
-}
-
-// Decay measured from the turning points.
-export function decayTable({ runs: { main }, modelInfo, body }) {
-  const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
-  const decreasing = turning.filter(({ x }, i) => i === 0 || Math.abs(x) < Math.abs(turning[i - 1].x));
-  const [first, last] = [decreasing[0], decreasing.at(-1)];
-  const decay = decreasing.length > 2 && decayBetween(Math.abs(first.x), Math.abs(last.x), (decreasing.length - 1) / 2);
-  if (!decay) return null;
-  const digits = Math.min(6, significantDigits(main));
-  const position = main.fmu.variables.get(body.position);
-  const size = (x) => formatValue(position, Math.abs(x), digits);
-  const rows = [
-    ["turning points", String(turning.length)],
-    ["first, and last that is smaller than the one before", `${size(first.x)}, ${size(last.x)}`],
-    ["logarithmic decrement per cycle", formatNumber(decay.delta, digits)],
-    ["equivalent damping ratio", formatNumber(decay.zeta, digits)],
-    ["amplitude loss per cycle", size(decay.loss)],
-  ];
-  const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output");
-  if (energy) {
-    const force = frictionFromEnergy(main, body, energy.name, decreasing);
-    rows.push(["mean friction from energy loss (all losses)", `${formatNumber(force, digits)} ${position.unit === "rad" ? "N·m" : "N"}`]);
-  }
-  return table("Decay", ["", "measured"], rows);
 }
 
 // The events with their times.
