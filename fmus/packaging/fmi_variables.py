@@ -77,17 +77,6 @@ def offers_model_exchange(model: Any) -> bool:
     return not getattr(model, "planar_modes", ())
 
 
-def array_name(declared: VariableDeclaration) -> str:
-    """Return the name of the array of an element, as mu.y of mu.y[1]; empty for a scalar."""
-    return declared.element.rpartition("[")[0]
-
-
-def array_starts(declared: Variables) -> list[int]:
-    """Return the value reference in FMI 3.0 of each variable: its index, or that of the first element of its array."""
-    first: dict[str, int] = {}
-    return [first.setdefault(array_name(meaning) or name, index) for index, (name, meaning) in enumerate(declared)]
-
-
 def integrated_states(declared: Variables) -> Variables:
     """Return the states that a solver integrates, in order of declaration."""
     return [(name, meaning) for name, meaning in declared if meaning.role == "state" and not meaning.rate]

@@ -16,8 +16,6 @@ from .fmi_variables import (
     TO_REST,
     Variables,
     all_variables,
-    array_name,
-    array_starts,
     derivative_indices,
     event_indicator_indices,
     has_step_events,
@@ -66,29 +64,14 @@ def describe(
     shared.add_log_categories_and_experiment(root, model, "fmi3")
     rates = derivative_indices(declared)
     parent, elements = SubElement(root, "ModelVariables"), list[Element]()
-    references = array_starts(declared)
     for reference, (variable, meaning) in enumerate(declared):
         attributes = shared.common_attributes(variable, meaning, reference) | shared.type_attributes(variable, meaning)
         if meaning.causality in ("input", "output") and meaning.variability == "continuous":
             attributes["intermediateUpdate"] = "true"
-        element = Element(TYPE_ELEMENTS[meaning.type], attributes)
-        elements.append(element)
-        if references[reference] == reference:
-            parent.append(element)
-            if array_name(meaning):
-                _make_array(element, declared[reference : reference + references.count(reference)])
+        elements.append(SubElement(parent, TYPE_ELEMENTS[meaning.type], attributes))
     shared.mark_states(elements, model, rates, nominals, first=0)
     _add_structure(root, model, declared, rates)
     return shared.serialize(root, "instantiationToken", code, date)
-
-
-def _make_array(element: Element, values: Variables) -> None:
-    """Turn the XML element of the first value of an array into that of the array."""
-    (_, first), (_, last) = values[0], values[-1]
-    element.set("name", array_name(first))
-    element.set("description", f"values{first.text.removeprefix('value')} to {last.text.removeprefix('value at ')}")
-    element.set("start", " ".join(repr(float(value.start)) for _, value in values))
-    SubElement(element, "Dimension", start=str(len(values)))
 
 
 def _add_types(root: Element, declared: Variables) -> None:
@@ -106,11 +89,7 @@ def _add_types(root: Element, declared: Variables) -> None:
 def _add_structure(root: Element, model: Any, declared: Variables, rates: dict[int, int]) -> None:
     """Add ModelStructure with all dependencies; for smooth models also dependenciesKind constant or tunable."""
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
-    references = array_starts(declared)
-    outputs, derivatives, at_first = (
-        {unknown: list(dict.fromkeys(references[known] for known in knowns)) for unknown, knowns in table.items()}
-        for table in shared.dependency_tables(model, declared, rates, SETTABLE_CAUSALITIES)
-    )
+    outputs, derivatives, at_first = shared.dependency_tables(model, declared, rates, SETTABLE_CAUSALITIES)
     for place, known in outputs.items():
         _add_unknown(structure, "Output", place, known)
     for place, known in derivatives.items():

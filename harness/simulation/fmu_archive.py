@@ -23,13 +23,13 @@ from ..errors import HarnessError, SceneError, by_interface, first_line, option_
 from ..process.temporary_directory import has_plain_uri, temporary_directory
 from ..scenes.fmu_files import check_built
 from ..scenes.run_spec import RunSpec
-from .array_elements import is_own, split_own_arrays
 from .model_data import read_model_data
 from .mtime_cache import cached_by_mtime
 from .variable_values import ExclusiveBound, effective_value, variable_unit
 
 DESCRIPTION_FILE = "modelDescription.xml"
 MAX_LISTED_FAULTS = 50  # violations listed in a message
+OWN_TOOL = "friction-fmus"  # begin of the generation tool of FMUs of this project
 REQUIRED_VARIABLES = ("solver.t_next", "solver.steps", "solver.rejected", "solver.evaluations")  # of this project
 # file with the name of the script of a Python FMU; the libraries of both packages contain this file name
 SCRIPT_NAME_FILE = "slavemodule.txt"
@@ -72,13 +72,18 @@ def describe_lenient() -> str:
     )
 
 
+def is_own(description: Any) -> bool:
+    """Return whether an FMU is one of this project."""
+    return (description.generationTool or "").startswith(OWN_TOOL)
+
+
 @cached_by_mtime
 def validate_description(path: Path, lenient: bool) -> Any:
     """Read and validate the model description of an existing file."""
     try:
         fmi_version = read_fmi_version(path)
         read = read_leniently if lenient else fmpy.read_model_description
-        description = None if fmi_version.startswith("1.") else split_own_arrays(read(path))
+        description = None if fmi_version.startswith("1.") else read(path)
         if description and is_own(description):
             mark_exclusive_bounds(description, path)
     except ValidationError as error:

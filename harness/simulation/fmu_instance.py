@@ -21,7 +21,6 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminat
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from ..errors import HarnessError, first_line
-from .array_elements import ArrayElement, ArrayValues, start_values
 
 WARNING, DISCARD = 1, 2  # of the statuses; any status above a warning is a failure
 STATUS_NAMES = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
@@ -122,7 +121,6 @@ class FmuInstance:
         self.variables = {variable.name: variable for variable in description.modelVariables}
         self.interface = description.modelExchange if exchange else description.coSimulation
         self.log.clear()
-        self.arrays = ArrayValues()
         self.fmu = self.instantiate(str(folder), name)
         self.component = c_void_p(self.fmu.component)
         self.is_new, self.reset_calls = True, (self.prepare_call("Reset"),)  # new: neither used nor initialized
@@ -214,8 +212,6 @@ class FmuInstance:
 
     def set(self, variable: Any, value: Any) -> None:
         """Set a variable of any type; an array from a list in row-major order."""
-        if isinstance(variable, ArrayElement):
-            variable, value = variable.array, self.arrays.update(variable, value)
         setter = getattr(self.fmu, f"set{self.type_name(variable)}")
         setter([variable.valueReference], value if isinstance(value, list) else [value])
 
@@ -223,8 +219,6 @@ class FmuInstance:
         """Return the value of a scalar variable that is no string."""
         variable = self.variables[name]
         getter = getattr(self.fmu, f"get{self.type_name(variable)}")
-        if isinstance(variable, ArrayElement):
-            return getter([variable.valueReference], len(start_values(variable.array)))[variable.index]
         return getter([variable.valueReference])[0]
 
     def step(self, t: float, h: float) -> None:
@@ -283,9 +277,8 @@ class FmuInstance:
         self.is_new = False
 
     def call_reset(self) -> None:
-        """Reset the instance, whose arrays have their start values again."""
+        """Reset the instance."""
         call_all(self.reset_calls)
-        self.arrays = ArrayValues()
 
     def close(self) -> None:
         """Free the instance."""

@@ -30,7 +30,6 @@ import numpy as np
 
 from ..errors import HarnessError, SceneError, by_interface, check_names
 from ..scenes.run_spec import RunSpec
-from .array_elements import whole_arrays
 from .fmu_instance import WARNING, FMICallException, FmuInstance, PreparedCall, call_all
 from .variable_values import REAL_TYPES, convert_value
 
@@ -83,7 +82,6 @@ def array_shape(variable: Any, values: Mapping[str, Any]) -> tuple[int, ...]:
 
 def select_variables(spec: RunSpec, variables: Mapping[str, Any], values: Mapping[str, Any]) -> list[ShapedVariable]:
     """Return the variables to record with their shapes; an element selects its whole array."""
-    variables = whole_arrays(variables)
     shapes = {name: array_shape(variable, values) for name, variable in variables.items() if variable.type in C_TYPES}
     named = {name if name in shapes else name.rpartition("[")[0] for name in spec.outputs} & {*shapes}
     if (count := sum(prod(shapes[name]) for name in named)) > MAX_COLUMNS:

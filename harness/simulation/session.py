@@ -19,7 +19,6 @@ from ..errors import HarnessError, SceneError, check_names, format_value
 from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from ..scenes.scene import SHORT_KEYS
-from .array_elements import group_elements
 from .fmu_archive import resolve_time_span
 from .fmu_instance import CALL_FAILURES, FmuInstance, call_all
 from .model_data import read_model_data
@@ -148,15 +147,15 @@ class Session:
         experiment = (0, 0.0, start, 1, stop)  # no tolerance
         calls = [call("SetupExperiment", *experiment)] if is_fmi2 else []
         for type_name, names in groups.items():
-            variables, positions, initial = group_elements(self.variables[name] for name in names)
+            variables = [self.variables[name] for name in names]
             kind = float if variables[0].type in REAL_TYPES else int
-            buffer = (c_type(variables[0], is_fmi2) * len(initial))(*map(kind, initial))
-            for name, i in zip(names, positions, strict=True):
+            buffer = (c_type(variables[0], is_fmi2) * len(names))()
+            for i, name in enumerate(names):
                 slots[name] = buffer, i, kind
                 if name in values:
                     buffer[i] = values[name]
             references = self.instance.make_references(variables)
-            counts = () if is_fmi2 else (len(initial),)
+            counts = () if is_fmi2 else (len(names),)
             calls.append(call(f"Set{type_name}", references, len(variables), buffer, *counts))
         calls.append(call("EnterInitializationMode", *(() if is_fmi2 else experiment)))
         self.start_calls = [*calls, call("ExitInitializationMode")]

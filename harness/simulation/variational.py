@@ -36,7 +36,6 @@ from lxml import etree
 from ..errors import HarnessError
 from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
-from .array_elements import ArrayElement, split_own_arrays, start_values
 from .event_mode import MAX_EVENTS, update_discrete_states
 from .fmu_archive import DESCRIPTION_FILE, read_leniently
 from .fmu_instance import CALL_FAILURES, WARNING, FmuInstance, LogCapture
@@ -195,12 +194,6 @@ class VariationalRun:
             return Known(variable, np.array([value]), 0, states.index(variable), -1)
         if variable in self.inputs:
             return Known(variable, np.ones(1), 0, -1, self.inputs.index(variable))
-        if isinstance(variable, ArrayElement):
-            values = np.array(start_values(variable.array))
-            for other, value in self.settings.items():
-                if isinstance(other, ArrayElement) and other.array is variable.array:
-                    values[other.index] = value
-            return Known(variable, values, variable.index, -1, -1)
         return Known(variable, np.array([float(self.settings.get(variable, variable.start or 0.0))]), 0, -1, -1)
 
     def allocate(self, groups: dict[str, list[Any]]) -> None:
@@ -236,10 +229,7 @@ class VariationalRun:
         modes = [instance.variables[name] for name in self.modes]
         self.mode_structs = (ElementStruct * max(len(modes), 1))()
         for mode, variable in zip(self.mode_structs, modes, strict=False):
-            is_element = isinstance(variable, ArrayElement)
             mode.reference, mode.width, mode.element = variable.valueReference, 1, 0
-            if is_element:
-                mode.width, mode.element = len(start_values(variable.array)), variable.index
         run = self.run = RunStruct(instance=instance.component, fmi=2 if is_fmi2 else 3, n=n, m=m, q=q)
         run.r, run.n_inputs, run.n_times = len(self.spec.outputs), len(self.inputs), len(self.times)
         run.n_modes, run.n_signals, run.duration = len(modes), len(self.columns.get(TIME, ())), self.stop - self.start
@@ -544,7 +534,7 @@ def differentiate(
     report : callable
         Receives the progress from 0 to 1.
     """
-    description = split_own_arrays(read_leniently(folder))
+    description = read_leniently(folder)
     try:
         instance = FmuInstance(description, folder, exchange=True, name=spec.model, log=LogCapture(stderr))
     except HarnessError as error:

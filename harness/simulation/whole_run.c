@@ -45,7 +45,7 @@ typedef struct {
 
 typedef struct {
     const Reference *references;
-    size_t count, n_values; /* they differ if there are arrays */
+    size_t count;
     double *values;
 } Variables;
 
@@ -55,7 +55,7 @@ static bool set(const Fmu *fmu, const Variables *which, const double *values)
     if (fmu->fmi == 2)
         return ((const Fmi2 *)fmu->functions)->set(fmu->instance, which->references, which->count, values) <= WARNING;
     return ((const Fmi3 *)fmu->functions)
-               ->set(fmu->instance, which->references, which->count, values, which->n_values) <= WARNING;
+               ->set(fmu->instance, which->references, which->count, values, which->count) <= WARNING;
 }
 
 static bool get(const Fmu *fmu, const Variables *which, double *values)

@@ -8,7 +8,7 @@ Inputs are linear within a step if the FMU interpolates inputs, otherwise they h
 import pickle
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from ctypes import CDLL, Structure, addressof, byref, c_double, c_int, c_size_t, c_void_p, cast
 from dataclasses import dataclass
@@ -25,7 +25,6 @@ from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
 from ..process.worker import Worker, WorkerError
 from ..scenes.run_spec import RunSpec
-from .array_elements import group_elements
 from .fmu_archive import (
     PROCESS_RESOURCES,
     exposes_solver_steps,
@@ -68,7 +67,7 @@ class FmuStruct(Structure):
 class VariablesStruct(Structure):
     """The struct Variables of whole_run.c."""
 
-    _fields_ = (("references", c_void_p), ("count", c_size_t), ("n_values", c_size_t), ("values", c_void_p))
+    _fields_ = (("references", c_void_p), ("count", c_size_t), ("values", c_void_p))
 
 
 Run = Callable[[Mapping[str, float]], np.ndarray | None]  # outputs of a run with values; None if the FMU refuses them
@@ -132,13 +131,9 @@ class CompiledLoop:
 
     def name_values(self, names: tuple[str, ...]) -> None:
         """Prepare the arguments for values of these variables."""
-        variables, self.positions, values = group_elements(self.instance.variables[name] for name in names)
-        self.names, self.x = names, np.array(values)
-        self.structs = [self.simulator.make_struct(variables, len(values), self.x)]
-        for group, array in (self.inputs, self.u), (self.outputs, self.y):
-            self.structs.append(
-                self.simulator.make_struct([self.instance.variables[name] for name in group], len(group), array)
-            )
+        self.names, self.x = names, np.empty(len(names))
+        groups = (names, self.x), (self.inputs, self.u), (self.outputs, self.y)
+        self.structs = [self.simulator.make_struct(group, array) for group, array in groups]
         pointers = [byref(self.simulator.handle), *map(byref, self.structs)]
         arrays = [c_void_p(array.ctypes.data) for array in (self.t, self.is_recorded)]
         self.orders = (c_int * len(self.inputs))(*[1] * len(self.inputs))
@@ -149,7 +144,7 @@ class CompiledLoop:
         """Return the outputs (recorded points, outputs); None if the FMU refuses the values or is too slow."""
         if tuple(values) != self.names:
             self.name_values(tuple(values))
-        self.x[self.positions] = [*values.values()]
+        self.x[:] = [*values.values()]
         try:
             self.instance.restart()
             for variable, value in self.settings:
@@ -167,8 +162,7 @@ class CompiledLoop:
         instance, t, start_time = self.instance, self.t.tolist(), process_time()
         inputs = [instance.variables[name] for name in self.inputs]
         assert self.names is not None
-        values = self.x[self.positions].tolist()
-        start = [*zip(self.names, values, strict=True), *zip(self.inputs, self.u[0].tolist(), strict=True)]
+        start = [*zip(self.names, self.x.tolist(), strict=True), *zip(self.inputs, self.u[0].tolist(), strict=True)]
         instance.initialize([(instance.variables[name], value) for name, value in start], t[0], t[-1])
         rows = iter(self.y)
         for i in range(len(t)):
@@ -256,12 +250,11 @@ class Simulator:
         """Prepare runs that differ in Reals only."""
         return CompiledLoop(spec, self).run
 
-    def make_struct(self, variables: Sequence[Any], n_values: int, values: np.ndarray) -> VariablesStruct:
-        """Return the struct of variables, which have `n_values` values, and values; the value references are cached."""
-        names = tuple(variable.name for variable in variables)
+    def make_struct(self, names: tuple[str, ...], values: np.ndarray) -> VariablesStruct:
+        """Return the struct of variables and their values; the value references are cached."""
         if names not in self.references:
-            self.references[names] = self.instance.make_references(variables)
-        return VariablesStruct(addressof(self.references[names]), len(names), n_values, values.ctypes.data)
+            self.references[names] = self.instance.make_references([self.instance.variables[name] for name in names])
+        return VariablesStruct(addressof(self.references[names]), len(names), values.ctypes.data)
 
     def close(self) -> None:
         """Free the instance."""

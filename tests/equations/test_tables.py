@@ -9,7 +9,6 @@ import fmpy
 import numpy as np
 import pytest
 from build_cache import build_user_model
-from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Model
 from model_text import remove_unused
 from models import DOP853, ODE23, ODE45, RODAS, scalar_class
@@ -325,19 +324,14 @@ def tunable_fmus(tmp_path_factory):
     return {kind: build_user_model(folder / "bench.py", *KINDS[kind]) / kind / "bench.fmu" for kind in KINDS}
 
 
-def fmpy_values(kind, values):
-    """Return values of mu for fmpy: by element in FMI 2.0, as an array in FMI 3.0."""
-    return {"mu.y": [*values]} if kind == "native/fmi3" else dict(zip(ELEMENTS, values, strict=True))
-
-
 @pytest.mark.slow
 def test_values_of_a_table_have_structured_names(tunable_fmus):
-    """Each kind is valid by the schema and fmpy; FMI 2.0 has scalars and FMI 3.0 an array of the same start values."""
-    for kind, path in tunable_fmus.items():
+    """Each kind is valid by the schema and fmpy, with a scalar for each value."""
+    for path in tunable_fmus.values():
         description = fmpy.read_model_description(path, validate_variable_names=True)
         assert description.variableNamingConvention == "structured"
         declared = {v.name: v for v in description.modelVariables if v.name.startswith("mu.")}
-        assert {*declared} == {*fmpy_values(kind, TUNABLE[1])}
+        assert [*declared] == ELEMENTS
         assert " ".join(v.start for v in declared.values()) == "0.5 0.3 0.0 0.3 0.3"
         assert {v.variability for v in declared.values()} == {"tunable"}
         info = harness.describe(path)
@@ -351,7 +345,11 @@ def test_values_of_a_table_give_the_motion_of_the_same_numbers(worker, tunable_f
     expected = worker.simulate(constant, "CoSimulation", stop_time=STOP, output=["x", "F_friction"])
     run = harness.simulate(constant, rtol=1e-8)
     for kind, path in tunable_fmus.items():
-        start = {"start_values": fmpy_values(kind, FRICTION[1]), "stop_time": STOP, "output": ["x", "F_friction"]}
+        start = {
+            "start_values": dict(zip(ELEMENTS, FRICTION[1], strict=True)),
+            "stop_time": STOP,
+            "output": ["x", "F_friction"],
+        }
         assert worker.simulate(path, "CoSimulation", **start) == expected
         if kind:
             columns = worker.simulate(path, "ModelExchange", relative_tolerance=1e-10, **start)
@@ -363,25 +361,15 @@ def test_values_of_a_table_give_the_motion_of_the_same_numbers(worker, tunable_f
             harness.simulate(path, {"mu.y[4]": -0.1})
 
 
-def test_calls_with_arrays_have_one_value_per_element(tunable_fmus, tmp_path):
-    """Values are read and set with those of scalars, derivatives by each element are exact, others are refused."""
+def test_derivatives_by_values_of_a_table_are_exact(tunable_fmus, tmp_path):
     with fmi3_instance(tunable_fmus["native/fmi3"], tmp_path) as (fmu, number):
-        mu, mass, a = (number[name] for name in ("mu.y", "m", "a"))
-        fmu.setFloat64([mu, mass], [*FRICTION[1], M])
-        assert fmu.getFloat64([mass, mu], 6) == [M, *FRICTION[1]]
-        for references, values in ([mu], [0.1]), ([mu + 1], [0.1]), ([mu], [0.1, 0.1, 0.1, -0.1, 0.1]):
-            with pytest.raises(FMICallException):
-                fmu.setFloat64(references, values)
-        assert fmu.getFloat64([mu], 5) == [*FRICTION[1]]
+        values = [number[name] for name in ELEMENTS]
+        fmu.setFloat64([*values, number["m"]], [*FRICTION[1], M])
         move(fmu, 0.15, -0.04)
         expected = [0.0, N / M * 2.0 / 3.0, N / M / 3.0, 0.0, 0.0]
-        assert list(fmu.getAdjointDerivative([a], [mu], [1.0], 5)) == pytest.approx(expected, rel=1e-12)
-        (derivative,) = fmu.getDirectionalDerivative([a], [mu], [0.0, 3.0, 6.0, 1.0, 1.0])
+        assert list(fmu.getAdjointDerivative([number["a"]], values, [1.0], 5)) == pytest.approx(expected, rel=1e-12)
+        (derivative,) = fmu.getDirectionalDerivative([number["a"]], values, [0.0, 3.0, 6.0, 1.0, 1.0])
         assert derivative == pytest.approx(3.0 * expected[1] + 6.0 * expected[2], rel=1e-12)
-        saved = fmu.getFMUState()
-        fmu.setFloat64([mu], [0.0] * 5)
-        fmu.setFMUState(saved)
-        assert fmu.getFloat64([mu], 5) == [*FRICTION[1]]
 
 
 @pytest.mark.slow
@@ -393,15 +381,6 @@ def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
     fit = harness.fit(tunable_fmus[kind], record, [*FITTED], observe=["x"], sigma={"x": 1e-5})
     for name, value in FITTED.items():
         assert fit[name].value == pytest.approx(value, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_a_sweep_varies_an_element_of_an_array(tunable_fmus):
-    """Runs in FMI 3.0 are those of the scalar in FMI 2.0; other elements keep their start values."""
-    ends = [harness.simulate(tunable_fmus["native"], {"mu.y[2]": value})["x"][-1] for value in (0.2, 0.4)]
-    sweep = harness.sweep(tunable_fmus["native/fmi3"], {"mu.y[2]": [0.2, 0.4]})
-    assert sweep.data["final_x"].dims == ("mu.y[2]",)
-    assert sweep.data["final_x"].to_numpy() == pytest.approx(ends, abs=1e-6)
 
 
 @pytest.mark.parametrize("spring", [SPRING, ((-0.2, 0.2), (-40.0, 40.0))], ids=["four points", "two points"])

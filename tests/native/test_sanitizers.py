@@ -98,7 +98,7 @@ class Slider(Model):
 
 @pytest.fixture(scope="module", params=["slider", "smd", "stickslip"])
 def cosimulation(request, tmp_path_factory):
-    """The program for a model with an array of parameters, and for two shipped ones."""
+    """The program for a model with values of a table as parameters, and for two shipped ones."""
     if request.param != "slider":
         return program("fmi3_stress.c", fmi3_fixtures.build_fmi3_fmus() / f"{request.param}.fmu")
     path = tmp_path_factory.mktemp("slider") / "slider.py"

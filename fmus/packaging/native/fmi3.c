@@ -141,20 +141,8 @@ static int64_t read_int64(const Instance *self, uint32_t reference)
 
 /* ---- values */
 
-/* Return the number of values of variables. An invalid value reference counts as one, and is refused later. */
-static size_t count_values(const fmi3ValueReference references[], size_t n)
-{
-    size_t count = n;
-    for (size_t i = 0; HAS_ARRAYS && references && i < n; i++) {
-        uint32_t size = references[i] < VARIABLES ? value_count(references[i]) : 1;
-        if (size > 1) count += size - 1;
-    }
-    return count;
-}
-
-#define REQUIRE_LENGTH                                              \
-    if (nValues != count_values(valueReferences, nValueReferences)) \
-        return refuse(self, WRONG_LENGTH, __func__, "the number of values")
+#define REQUIRE_LENGTH \
+    if (nValues != nValueReferences) return refuse(self, WRONG_LENGTH, __func__, "the number of values")
 
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)
@@ -393,8 +381,8 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
     REQUIRE_PHASE(instance, IN_ANY_PHASE);
-    if (nSeed != count_values(knowns, nKnowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
-    if (nSensitivity != count_values(unknowns, nUnknowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
+    if (nSeed != nKnowns) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
+    if (nSensitivity != nUnknowns) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
     return get_directional_derivative(self, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__);
 }
 
@@ -404,15 +392,15 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
     REQUIRE_PHASE(instance, IN_ANY_PHASE);
-    if (nSeed != count_values(unknowns, nUnknowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
-    if (nSensitivity != count_values(knowns, nKnowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
+    if (nSeed != nUnknowns) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
+    if (nSensitivity != nKnowns) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
     if (check_derivative_references(self, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__)) {
         return fmi3Error;
     }
-    FOR_EACH_VALUE(knowns, nKnowns) {
+    for (size_t k = 0; k < nKnowns; k++) {
         struct Tangent tangent = {0};
-        *tangent_value(&tangent, element) = 1.0;
-        fmi3Status status = evaluate_tangent(self, &tangent, variables[element].is_real_parameter);
+        *tangent_value(&tangent, knowns[k]) = 1.0;
+        fmi3Status status = evaluate_tangent(self, &tangent, variables[knowns[k]].is_real_parameter);
         sensitivity[k] = status ? NAN : 0.0;
         for (size_t i = 0; i < nUnknowns; i++) sensitivity[k] += seed[i] * *tangent_value(&tangent, unknowns[i]);
         if (status) return status;

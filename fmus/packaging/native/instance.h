@@ -156,18 +156,9 @@ static void warn_of_inconsistent_rate(Instance *self)
 
 /* ---- reading and writing */
 
-/* Number of values that a value reference stands for; a constant where there are no arrays. */
-static uint32_t value_count(uint32_t reference) { return HAS_ARRAYS ? variables[reference].size : 1; }
-
-/* Loop over the values of n value references: `element` is the index of the variable, `k` that of the value. An index of
- * 64 bits cannot overflow, so that compilers drop the inner loop where there are no arrays. */
-#define FOR_EACH_VALUE(vr, n)               \
-    for (size_t r = 0, k = 0; r < (n); r++) \
-        for (uint64_t element = vr[r], end = element + value_count(vr[r]); element < end; element++, k++)
-
 static bool has_type(uint32_t reference, const FmiType *type)
 {
-    return reference < VARIABLES && value_count(reference) && variables[reference].is_real == type->is_real;
+    return reference < VARIABLES && variables[reference].is_real == type->is_real;
 }
 
 /* Refuse a call unless all value references have the type and no pointer is NULL. */
@@ -272,16 +263,16 @@ static int64_t read_integer(const Instance *self, uint32_t reference)
 /* Bodies of the functions that read and write values. */
 #define READ_VALUES(self, type, vr, n, value, at)                                \
     if (prepare_values(self, type, vr, n, value, __func__)) return STATUS_ERROR; \
-    FOR_EACH_VALUE(vr, n) value[k] = at(self, element);                          \
+    for (size_t i = 0; i < (n); i++) value[i] = at(self, vr[i]);                 \
     return STATUS_OK
 
 #define WRITE_VALUES(self, type, vr, n, value)                                     \
     if (check_references(self, type, vr, n, value, __func__)) return STATUS_ERROR; \
-    FOR_EACH_VALUE(vr, n) {                                                        \
-        if (check_value(self, element, value[k])) return STATUS_ERROR;             \
+    for (size_t i = 0; i < (n); i++) {                                             \
+        if (check_value(self, vr[i], value[i])) return STATUS_ERROR;               \
     }                                                                              \
-    FOR_EACH_VALUE(vr, n) {                                                        \
-        if (write_value(self, element, value[k])) return STATUS_ERROR;             \
+    for (size_t i = 0; i < (n); i++) {                                             \
+        if (write_value(self, vr[i], value[i])) return STATUS_ERROR;               \
     }                                                                              \
     return STATUS_OK
 
@@ -421,7 +412,7 @@ static Status check_derivative_references(const Instance *self, const uint32_t u
     for (size_t i = 0; i < n + m; i++) {
         uint32_t reference = i < n ? unknowns[i] : knowns[i - n];
         const Variable *variable = reference < VARIABLES ? &variables[reference] : NULL;
-        if (!variable || !value_count(reference) || variable->tangent_offset == NO_OFFSET ||
+        if (!variable || variable->tangent_offset == NO_OFFSET ||
             !(i < n ? variable->is_calculated : variable->is_state_or_input || variable->is_real_parameter)) {
             return refuse_call(self, NO_PARTIAL_DERIVATIVE, &(Call){.function = function, .reference = reference});
         }
@@ -480,9 +471,9 @@ static Status get_directional_derivative(Instance *self, const uint32_t unknowns
     struct Tangent tangent = {0};
     bool along_parameters = false;
     if (check_derivative_references(self, unknowns, n, knowns, m, seed, sensitivity, function)) return STATUS_ERROR;
-    FOR_EACH_VALUE(knowns, m) {
-        *tangent_value(&tangent, element) += seed[k];
-        along_parameters |= variables[element].is_real_parameter;
+    for (size_t i = 0; i < m; i++) {
+        *tangent_value(&tangent, knowns[i]) += seed[i];
+        along_parameters |= variables[knowns[i]].is_real_parameter;
     }
     Status status = evaluate_tangent(self, &tangent, along_parameters);
     for (size_t i = 0; i < n; i++) sensitivity[i] = status ? NAN : *tangent_value(&tangent, unknowns[i]);

@@ -22,7 +22,6 @@ from ..fmi_variables import (
     TO_BREAK_AWAY,
     TO_REST,
     all_variables,
-    array_starts,
     declared_variables,
     derivative_indices,
     event_indicator_indices,
@@ -57,7 +56,7 @@ typedef struct {run_class} Run;
 
 enum {{ VARIABLES = {count}, DECLARED = {declared}, T_NEXT = {ahead}, STATES = {states}, INDICATORS = {indicators} }};
 
-enum {{ DISCRETE = {count_of_discrete}, HAS_ARRAYS = {has_arrays} }};
+enum {{ DISCRETE = {count_of_discrete} }};
 
 /* Value references of the discrete variables. */
 static const uint32_t discrete_variables[DISCRETE] = {{{discrete}}};
@@ -165,8 +164,6 @@ def render_model_header(model: Any, fmi: str) -> str:
         call_graph.add_entry_point(function, arg_types)
     layout = call_graph.layout
     names, interpolated = [name for name, _ in declared], interpolated_inputs(model)
-    references = array_starts(declared) if fmi == "3" else [*range(len(declared))]
-    sizes = [references.count(index) for index in range(len(declared))]
     roots = [("run", type(run)), ("model", type(instance))]
     members = [(path, ctype) for prefix, cls in roots for path, ctype in layout.iter_scalars(cls, f"{prefix}.")]
     members = [(path, ctype) for path, ctype in members if ctype in (INT, BOOL)]
@@ -193,19 +190,17 @@ def render_model_header(model: Any, fmi: str) -> str:
         indicators=len(event_indicator_indices(declared)),
         discrete=", ".join(map(str, discrete)),
         count_of_discrete=len(discrete),
-        has_arrays=int(max(sizes) > 1),
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {c_literal(ctype is BOOL)}}},\n" for path, ctype in members),
         table="".join(
             _variable_row(
                 name,
                 meaning,
-                size,
                 attribute_path(model, name),
                 tangent_fields(declared),
                 derivative_attributes(instance, name, interpolated),
             )
-            for (name, meaning), size in zip(declared, sizes, strict=True)
+            for name, meaning in declared
         ),
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(instance.rules, rule_fields),
         inconsistent_input="model->inconsistent_input" if model.counts_jumps else "0",
@@ -260,7 +255,6 @@ def _items_array_name(name: str) -> str:
 def _variable_row(
     name: str,
     meaning: VariableDeclaration,
-    size: int,
     path: str,
     tangent_fields: dict[str, str],
     derivatives: Collection[str],
@@ -285,7 +279,6 @@ def _variable_row(
     )
     parts = [
         *map(c_string_literal, texts),
-        str(size),
         f"offsetof(State, {path})",
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),

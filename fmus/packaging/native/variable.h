@@ -1,5 +1,4 @@
-/* A declared variable. Its value reference is its index in the table in model.h. In FMI 3.0, an array has that of its
- * first element, and the others none. */
+/* A declared variable. Its value reference is its index in the table in model.h. */
 #ifndef VARIABLE_H
 #define VARIABLE_H
 
@@ -14,7 +13,6 @@
 typedef struct {
     const char *name, *text;       /* text: the description */
     const char *unit, *allowed;    /* unit suffix and allowed range, as in messages */
-    uint32_t size;                 /* number of values by its value reference; 0 without one */
     size_t offset;                 /* in State */
     size_t tangent_offset;         /* in struct Tangent; NO_OFFSET without a derivative */
     bool is_real;                  /* a Real of FMI; otherwise an integer */

@@ -9,7 +9,6 @@ from fmpy.fmi1 import FMICallException
 
 from ...errors import HarnessError, first_line
 from ...scenes.run_spec import RunSpec
-from ..array_elements import split_own_arrays
 from ..event_mode import Clocks, EventCoSimulation
 from ..fmu_archive import read_leniently
 from ..fmu_instance import (
@@ -53,7 +52,7 @@ class ExternalFmu:
 
     def __init__(self, spec: RunSpec, folder: Path, directory: Path, report: Callable[[float, str], None]) -> None:
         self.spec, self.folder, self.directory = spec, folder, directory
-        self.description = split_own_arrays(read_leniently(folder))
+        self.description = read_leniently(folder)
         variables = {variable.name: variable for variable in self.description.modelVariables}
         self.settings = [(variables[name], value) for name, value in spec.values.items()]
         self.selection = select_variables(spec, variables, spec.values)

@@ -19,7 +19,6 @@ from ...errors import MAX_VALUE_LENGTH, HarnessError, SceneError, check_names, o
 from ...process.temporary_directory import temporary_directory
 from ...process.worker import Worker, WorkerDiedError, WorkerTimeoutError
 from ...scenes.run_spec import RunSpec
-from ..array_elements import ArrayElement
 from ..event_mode import check_clocks
 from ..fmu_archive import resolve_time_span, unpack
 from ..recorder import Columns, ShapedVariable, array_shape, element_names, read_rows, select_variables
@@ -252,7 +251,7 @@ def build_trajectory(
     return Trajectory(time, columns, units, descriptions, spec=effective_spec, parameters=parameters)
 
 
-def alias_key(variable: Any) -> tuple[str, int, int]:
-    """Return type, value reference and index of a variable, which alias variables share."""
+def alias_key(variable: Any) -> tuple[str, int]:
+    """Return type and value reference of a variable, which alias variables share."""
     kind = "Integer" if variable.type == "Enumeration" else variable.type
-    return kind, variable.valueReference, variable.index if isinstance(variable, ArrayElement) else 0
+    return kind, variable.valueReference

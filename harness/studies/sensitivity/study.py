@@ -10,9 +10,8 @@ import numpy as np
 from ...errors import HarnessError, SceneError, check_names
 from ...process.worker import WorkerDiedError, WorkerTimeoutError, call_once
 from ...scenes.run_spec import RunSpec
-from ...simulation.array_elements import is_own
 from ...simulation.external.simulation import convert_values
-from ...simulation.fmu_archive import read_description, resolve_time_span, unpack_once
+from ...simulation.fmu_archive import is_own, read_description, resolve_time_span, unpack_once
 from ...simulation.fmu_instance import capture_stderr
 from ...simulation.model_data import read_model_data
 from ...simulation.native_equivalent import check_has_events, native_with_derivatives
