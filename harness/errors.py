@@ -96,6 +96,15 @@ def check_names(category: str, names: Iterable[object], allowed: Collection[str]
             raise SceneError(unknown_name_message(category, name, allowed))
 
 
+def check_varied(category: str, varied: Iterable[str], allowed: Collection[str], values: Collection[str]) -> None:
+    """Raise SceneError for a varied variable that is not allowed, or is also among the set values."""
+    varied = [*varied]
+    check_names(category, varied, allowed)
+    for name in varied:
+        if name in values:
+            raise SceneError(f"{name} is both varied and set; remove one of them")
+
+
 def option_text(name: str, value: object = None) -> str:
     """Return an option as the user writes it: as in `--rate 100` for a command, or `rate=100` for the Python API.
 

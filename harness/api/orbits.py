@@ -33,13 +33,14 @@ OVER = mapping(INCREASING_ROW, "rows of increasing numbers")
 DEFAULT_VALUES, DEFAULT_GRID = 61, 21  # values of a parameter of which only the ends are given: orbit, map
 
 
-@check_arguments(source=PATH, values=SETTINGS, over=OVER, period=POSITIVE, progress=PROGRESS)
+@check_arguments(source=PATH, values=SETTINGS, over=OVER, section=TEXT, period=POSITIVE, progress=PROGRESS)
 @with_progress_bar
 def orbit(
     source: "str | Path",
     values: Mapping[str, float | str] | None = None,
     *,
     over: "Mapping[str, ArrayLike] | None" = None,
+    section: str | None = None,
     inputs: "Mapping[str, ArrayLike] | None" = None,
     period: float | None = None,
     progress: Progress | bool | None = None,
@@ -59,6 +60,9 @@ def orbit(
         Parameters and start values by name, in the units of the FMU; enumerations by label or number.
     over : mapping, optional
         A parameter and its increasing values (n,); its two ends for 61 values.
+    section : str, optional
+        What motions without a force return to: the mode of a contact, where it ends to stick, or an output or a state,
+        where it rises through zero. By default the end of any stick.
     inputs : mapping, optional
         Input signals of one period, as in `simulate`: the column ``"time"`` in s, from 0, and one for each input.
     period : float, optional
@@ -89,11 +93,21 @@ def orbit(
 
     axes = {} if over is None else expand_axes(over, DEFAULT_VALUES, 1)
     name, row = next(iter(axes.items()), ("", ()))
-    return compute_orbits(resolve_motion(source, values, inputs), name, [*map(float, row)], period, reporter(progress))
+    spec = resolve_motion(source, values, inputs)
+    return compute_orbits(spec, name, [*map(float, row)], period, section or "", reporter(progress))
 
 
 @check_arguments(
-    source=PATH, over=OVER, values=SETTINGS, period=POSITIVE, workers=WORKERS, scheduler=TEXT, progress=PROGRESS
+    source=PATH,
+    over=OVER,
+    values=SETTINGS,
+    section=TEXT,
+    period=POSITIVE,
+    measure=TEXT,
+    levels=INCREASING_ROW,
+    workers=WORKERS,
+    scheduler=TEXT,
+    progress=PROGRESS,
 )
 @with_progress_bar
 def map_motions(
@@ -101,8 +115,11 @@ def map_motions(
     over: "Mapping[str, ArrayLike]",
     values: Mapping[str, float | str] | None = None,
     *,
+    section: str | None = None,
     inputs: "Mapping[str, ArrayLike] | None" = None,
     period: float | None = None,
+    measure: str | None = None,
+    levels: "ArrayLike | None" = None,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress | bool | None = None,
@@ -110,15 +127,24 @@ def map_motions(
     """Map what the motions of a model end in over one or two parameters, with exact edges between the regions.
 
     Of one body that slides steadily, the map says whether steady sliding is stable, and whether a motion that has stuck
-    sticks again: where both hold, the start decides. Of any other model it says what the motion from its start ends in,
-    with the number of sticks in a period. Edges are found by bisection along the lines of the grid.
+    sticks again: where both hold, the start decides. Of any other model it says what motions end in that begin at its
+    start, or where those at the points beside it end, with the number of sticks in a period. Edges are found by
+    bisection along the lines of the grid.
 
     Parameters
     ----------
-    source, values, inputs, period, progress
+    source : str or path
+        As in `orbit`. Any other FMU for co-simulation that saves its states needs a section or a measure.
+    values, inputs, period, progress
         As in `orbit`.
     over : mapping
         One or two parameters and their increasing values (n,); two ends for 21 values.
+    section : str, optional
+        As in `orbit`. Of any other FMU an output: the map says how often it rises through zero in a period.
+    measure : str, optional
+        A measure of `sweep` whose values are the regions, as ``"slips"``, ``"events"`` or ``"largest_x"``.
+    levels : array_like, optional
+        Increasing values (n,) of the measure between the regions; by default it must be a whole number.
     workers : int, optional
         Number of worker processes; by default all runs are done in this process, and by the command in one process for
         each processor.
@@ -140,11 +166,17 @@ def map_motions(
     >>> m = map_motions("belt", {"v_belt": (0.3, 8), "c": (0.03, 0.6)})  # doctest: +SKIP
     >>> [edge.point for edge in m.edges if edge.above == "steady sliding"]  # doctest: +SKIP
     """
-    from ..studies.motion_map.study import compute_map
+    import numpy as np
+
+    from ..studies.motion_map.study import MapRequest, compute_map
 
     axes = expand_axes(over, DEFAULT_GRID, 2)
     check_workers(workers, scheduler)
-    return compute_map(resolve_motion(source, values, inputs), axes, workers, scheduler, period, reporter(progress))
+    bounds = () if levels is None else tuple(np.asarray(levels, dtype=float).tolist())
+    request = MapRequest(
+        resolve_motion(source, values, inputs), tuple(axes), period, section or "", measure or "", bounds
+    )
+    return compute_map(request, tuple(axes.values()), workers, scheduler, reporter(progress))
 
 
 def resolve_motion(

@@ -5,10 +5,11 @@ from functools import partial
 import click
 
 from ..errors import SceneError
-from .orbit import split_axis
+from .orbit import split_axis, split_numbers
 from .terminal import (
     PERIOD_OPTION,
     SCHEDULER_OPTION,
+    SECTION_OPTION,
     SET_OPTION,
     WORKERS_OPTION,
     SectionedCommand,
@@ -28,7 +29,10 @@ from .terminal import (
     help="Parameter that varies, with its ends and 21 or N values. Once or twice.",
 )
 @SET_OPTION
+@SECTION_OPTION
 @PERIOD_OPTION
+@click.option("--measure", help="Measure of `sweep` whose whole numbers are the regions, as slips or events.")
+@click.option("--levels", help="Values between the regions of the measure, separated by commas.")
 @WORKERS_OPTION
 @SCHEDULER_OPTION
 @result_options
@@ -38,7 +42,10 @@ def map_motions(
     source: str,
     over: tuple[str, ...],
     values: tuple[str, ...],
+    section: str | None,
     period: float | None,
+    measure: str | None,
+    levels: str | None,
     workers: int,
     scheduler: str | None,
     terminal: Terminal,
@@ -46,12 +53,14 @@ def map_motions(
     """Print what the motions of a model end in over one or two parameters, with exact edges between the regions.
 
     Of one body that slides steadily, the regions say whether steady sliding is stable and whether stick-slip goes on;
-    of any other model, what the motion from its start ends in.  Of a model, its native FMU is run.
+    of any other model, what motions from its start and from those beside it end in.  Of a model, its native FMU is
+    run; any other FMU needs a section or a measure.
 
     \b
     Examples:
       friction-fmus map belt --over v_belt=0.3:8 --over c=0.03:0.6
       friction-fmus map forced --over Omega=2:15:40
+      friction-fmus map stickslip --over mu_d=0.3:0.8 --measure slips
     """
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
@@ -68,7 +77,8 @@ def map_motions(
     with terminal.progress(1) as report:
         local_workers = None if scheduler else workers
         compute = partial(compute_map, source, axes, settings, workers=local_workers, scheduler=scheduler)
-        compute = partial(compute, period=period, progress=partial(report, source))
+        compute = partial(compute, section=section, period=period, measure=measure, progress=partial(report, source))
+        compute = partial(compute, levels=None if levels is None else split_numbers(levels))
         folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])
         result = save_result(folder, compute, "map", describe_sources(source))
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

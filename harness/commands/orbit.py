@@ -5,16 +5,24 @@ from functools import partial
 import click
 
 from ..errors import MAX_VALUE_LENGTH, SceneError
-from .terminal import PERIOD_OPTION, SET_OPTION, SectionedCommand, Terminal, result_options
+from .terminal import PERIOD_OPTION, SECTION_OPTION, SET_OPTION, SectionedCommand, Terminal, result_options
 
 
 @click.command(cls=SectionedCommand)
 @click.argument("source", metavar="MODEL|SCENE|FMU")
 @SET_OPTION
 @click.option("--over", metavar="NAME=LO:HI[:N]", help="Parameter that varies, with its ends and 61 or N values.")
+@SECTION_OPTION
 @PERIOD_OPTION
 @result_options
-def orbit(source: str, values: tuple[str, ...], over: str | None, period: float | None, terminal: Terminal) -> None:
+def orbit(
+    source: str,
+    values: tuple[str, ...],
+    over: str | None,
+    section: str | None,
+    period: float | None,
+    terminal: Terminal,
+) -> None:
     """Print the steady sliding and the periodic motions of a model, and over a parameter the points where they change.
 
     Stable and unstable motions are found, with their Floquet multipliers.  Over a parameter, the points are located at
@@ -34,7 +42,8 @@ def orbit(source: str, values: tuple[str, ...], over: str | None, period: float 
 
     settings, axis = parse_assignments("--set", values), None if over is None else dict([split_axis(over)])
     with terminal.progress(1) as report:
-        compute = partial(find_orbits, source, settings, over=axis, period=period, progress=partial(report, source))
+        compute = partial(find_orbits, source, settings, over=axis, section=section, period=period)
+        compute = partial(compute, progress=partial(report, source))
         folder = terminal.out / "orbit" / "-".join([resolve(source).model, *(axis or {})])
         result = save_result(folder, compute, "orbit", describe_sources(source))
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)
@@ -54,3 +63,11 @@ def split_axis(text: str) -> tuple[str, list[float]]:
         hint = "write it as in v_belt=0.1:3 or, for 3 values or more, v_belt=0.1:3:60"
         raise SceneError(f"--over {text[:MAX_VALUE_LENGTH]} is invalid; {hint}") from None
     return name.strip(), [ends[0] + (ends[1] - ends[0]) * i / steps for i in range(steps)] + [ends[1]]
+
+
+def split_numbers(text: str) -> list[float]:
+    """Return the numbers of an argument of --levels."""
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise SceneError(f"--levels {text[:MAX_VALUE_LENGTH]} is invalid; write numbers as in 0.1,0.2") from None

@@ -127,6 +127,10 @@ PERIOD_OPTION = click.option(
     type=POSITIVE,
     help="Period in s of the inputs of a scene, or of forces that depend on a clock.",
 )
+SECTION_OPTION = click.option(
+    "--section",
+    help="What motions return to: the mode of a contact where it ends to stick, or an output where it rises through 0.",
+)
 STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
 RUN_OPTIONS = (
     STOP_OPTION,

@@ -8,16 +8,18 @@ import numpy as np
 from ..process.interrupt import check_interrupt
 
 PRECISION, MAX_HALVES = 1e-13, 200  # relative, of the values at edges
+MAX_SPLITS = 4
 RESOLVED = 1e-6  # relative width of an interval in which a third label is not due to rounding errors
 Label = TypeVar("Label", bound=Hashable)
 
 
 def find_edges(
-    label: Callable[[Any], Label], a: Any, b: Any, one: Label, two: Label
+    label: Callable[[Any], Label], a: Any, b: Any, one: Label, two: Label, splits: int = MAX_SPLITS
 ) -> list[tuple[Any, Any, Label, Label]]:
     """Return the edges between numbers or points a and b with labels one and two, as neighbours with their labels.
 
-    Where a third label is between theirs, there are several edges, unless they are closer than RESOLVED.
+    Where a third label is between theirs, there are several edges, unless they are closer than RESOLVED. Of the many
+    windows of chaotic motions, not all are found: an interval is split at most `splits` times.
     """
     if one == two:
         return []
@@ -29,8 +31,9 @@ def find_edges(
         found = label(middle)
         if found == one:
             a = middle
-        elif found == two or np.abs(b - a).max() <= RESOLVED * np.abs(b).max():
+        elif found == two or not splits or np.abs(b - a).max() <= RESOLVED * np.abs(b).max():
             b = middle
         else:
-            return find_edges(label, a, middle, one, found) + find_edges(label, middle, b, found, two)
+            splits -= 1
+            return find_edges(label, a, middle, one, found, splits) + find_edges(label, middle, b, found, two, splits)
     return [(a, b, one, two)]

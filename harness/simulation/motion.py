@@ -50,6 +50,11 @@ class Motion:
     value: float = nan
 
     @property
+    def name(self) -> str:
+        """Return the kind, of periodic motions the number of sticks in a period."""
+        return self.kind if self.kind in (AT_REST, STEADY) else count_text(self.n_sticks, "stick")
+
+    @property
     def amplitude(self) -> float:
         """Return half the range of the coordinate."""
         return 0.5 * (self.largest - self.smallest)
@@ -71,3 +76,8 @@ class Motion:
             return ""
         size = self.growth * self.period if self.period == self.period else self.growth
         return "neutral" if abs(size) <= NEUTRAL else "stable" if size < 0.0 else "unstable"
+
+
+def count_text(count: int, name: str) -> str:
+    """Return the number of sticks or returns in a period, as in "2 sticks in a period"."""
+    return f"{count} {name}{'s' * (count != 1)} in a period"

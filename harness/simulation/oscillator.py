@@ -4,17 +4,18 @@ The coordinates c = B^T y leave out translations that change no force, as of a s
 phase angle of a force.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain, islice
-from math import inf, pi
+from math import inf, nan, pi
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
-from ..errors import HarnessError, SceneError, check_names
+from ..errors import HarnessError, SceneError, check_names, check_varied
 from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import read_description, unpack_once
@@ -39,13 +40,17 @@ STOP = 1e9  # s: no motion ends there
 
 
 class Point(NamedTuple):
-    """A point of a motion: time in s, states and rates (n,), modes of the contacts, and the number of their changes."""
+    """A point of a motion: time in s, states and rates (n,), modes of the contacts, and the number of their changes.
+
+    `section` is the value of the variable whose zeros are the section; NaN without one.
+    """
 
     t: float
     y: np.ndarray
     f: np.ndarray
     modes: tuple[int, ...]
     n_changes: int
+    section: float = nan
 
     @property
     def sticks(self) -> bool:
@@ -76,10 +81,12 @@ class SteadySliding(NamedTuple):
 
 
 @contextmanager
-def open_oscillator(spec: RunSpec, varied: Sequence[str] = (), period: float | None = None) -> "Iterator[Oscillator]":
+def open_oscillator(
+    spec: RunSpec, varied: Sequence[str] = (), period: float | None = None, section: str = ""
+) -> "Iterator[Oscillator]":
     """Open an oscillator; its parameters are those of `Oscillator`."""
     with ExitStack() as resources:
-        yield Oscillator(spec, varied, period, resources)
+        yield Oscillator(spec, varied, period, section, resources)
 
 
 class Oscillator:
@@ -93,6 +100,9 @@ class Oscillator:
         Parameters that `set_point` changes.
     period : float or None
         Period in s of forces that depend on a clock.
+    section : str
+        What free motions return to: the mode of a contact, where it ends to stick, or a number, where it rises through
+        zero. Empty for the end of any stick.
     resources : contextlib.ExitStack
         Closes the instances.
 
@@ -129,17 +139,16 @@ class Oscillator:
         If its friction law has no events, or its states cannot be set.
     """
 
-    def __init__(self, spec: RunSpec, varied: Sequence[str], period: float | None, resources: ExitStack) -> None:
+    def __init__(
+        self, spec: RunSpec, varied: Sequence[str], period: float | None, section: str, resources: ExitStack
+    ) -> None:
         self.resources, self.varied, self.period, self.n_runs = resources, tuple(varied), period, 0
         description, self.folder = read_description(spec.fmu), unpack_once(spec.fmu)
         self.variables = {variable.name: variable for variable in description.modelVariables}
         self.parameters = [
             name for name, item in self.variables.items() if item.causality == "parameter" and item.type == "Real"
         ]
-        check_names("parameter", varied, self.parameters)
-        for name in varied:
-            if name in spec.values:
-                raise SceneError(f"{name} is both varied and set; remove one of them")
+        check_varied("parameter", varied, self.parameters, spec.values)
         self.states = tuple(state.name for state in state_variables(description))
         self.rates = tuple(unknown.variable.name for unknown in description.derivatives)
         self.speeds = np.isin(self.states, self.rates).astype(float)
@@ -157,8 +166,13 @@ class Oscillator:
         ]
         self.initial = tuple(dict.fromkeys([*find_start_parameters(description, self.states), *angles]))
         modes = tuple(read_model_data(spec.fmu).contacts.values())
-        reals = [*dict.fromkeys((*self.states, *self.rates, "solver.t_next"))]
-        self.positions = [[reals.index(name) for name in group] for group in (self.states, self.rates)]
+        readable = [name for name, item in self.variables.items() if item.causality == "output" and item.type == "Real"]
+        check_names("section", [section] * bool(section), [*modes, *self.states, *readable])
+        self.crossed = "" if section in modes else section
+        self.released = slice(modes.index(section), modes.index(section) + 1) if section in modes else slice(None)
+        reals = [*dict.fromkeys((*self.states, *self.rates, *[section] * bool(self.crossed), "solver.t_next"))]
+        groups = self.states, self.rates, [section] * bool(self.crossed)
+        self.positions = [[reals.index(name) for name in group] for group in groups]
         self.n_modes, read = len(modes), [*modes, *["events.count"] * bool(modes), *reals]
         self.instance = resources.enter_context(open_instance(self.spec, self.folder))
         self.session = Session(self.instance, self.spec, (*self.varied, *self.initial), read)
@@ -172,6 +186,8 @@ class Oscillator:
         self.matrix = np.array(columns).reshape(-1, len(self.states)).T
         self.inverse = np.linalg.pinv(self.matrix)
         self.find_coordinates()
+        if section and self.is_forced:
+            raise SceneError("motions with a force return after its period: remove the section")
 
     def default(self, name: str) -> float:
         """Return the value of a parameter of the source."""
@@ -209,7 +225,8 @@ class Oscillator:
         self.t_next = float(reals[-1])
         n_changes = int(values[self.n_modes]) if modes else 0
         y = reals[self.positions[0]] + self.shift
-        return Point(t, y, reals[self.positions[1]], tuple(map(int, modes)), n_changes)
+        section = float(reals[self.positions[2]].sum()) if self.crossed else nan
+        return Point(t, y, reals[self.positions[1]], tuple(map(int, modes)), n_changes, section)
 
     def step(self, t: float, end: float) -> Point:
         """Go on from a time to another one, in s."""
@@ -231,9 +248,9 @@ class Oscillator:
     def follow(self, y: np.ndarray, stop: float = STOP, every: float = inf) -> Iterator[Point]:
         """Yield the ends of internal steps from states y until a time in s; a change of mode ends a step.
 
-        With `every`, the multiples of this time are among them.
+        With `every`, the multiples of this time are among them. A zero of the section is one, and starts a new run.
         """
-        point, n = self.begin(y), 1
+        point, n, start = self.begin(y), 1, 0.0
         yield point
         for number in range(MAX_STEPS):
             if number % 1000 == 0:
@@ -242,10 +259,37 @@ class Oscillator:
                 return
             n += point.t == n * every
             row = float(self.rows[np.searchsorted(self.rows, point.t, side="right")])
-            end = min(max(self.t_next, float(np.nextafter(point.t, inf))), stop, n * every, row)
-            point = self.step(point.t, end)
+            end = min(max(start + self.t_next, float(np.nextafter(point.t, inf))), stop, n * every, row)
+            last, point = point, self.step(point.t - start, end - start)._replace(t=end)
+            if last.section < 0.0 <= point.section:
+                zero = self.locate(last, point, lambda at: at.section)
+                point, start = self.begin(zero.y)._replace(t=zero.t, section=0.0), zero.t
             yield point
         raise HarnessError(f"the motion needs more than {MAX_STEPS} steps until t = {point.t:.6g} s")
+
+    def is_return(self, last: Point, point: Point) -> bool:
+        """Return whether a motion passes the section between two points of `follow`."""
+        if self.crossed:
+            return last.section < 0.0 == point.section
+        one, two = last.modes[self.released], point.modes[self.released]
+        return 0 in one and 0 not in two
+
+    def locate(self, last: Point, point: Point, value: Callable[[Point], float]) -> Point:
+        """Return the point between two points at which a value is zero."""
+        found, h = [point], point.t - last.t
+
+        def value_after(time: float) -> float:
+            self.begin(last.y)
+            found[0] = self.step(0.0, time)
+            return value(found[0])
+
+        low, high = value(last), value(point)
+        if high and low * high < 0.0:
+            root = brentq(
+                lambda s: low if s == 0.0 else high if s == h else value_after(s), 0.0, h, xtol=1e-15, rtol=1e-15
+            )
+            value_after(max(float(root), 1e-12 * h))
+        return found[0]._replace(t=last.t + found[0].t)
 
     def differentiate(self, y: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (n,) after a time in s, and their derivatives (n, n) by the states y, or NaN."""

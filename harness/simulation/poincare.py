@@ -25,6 +25,7 @@ from .motion import NEUTRAL, SLIDING_ORBIT, STICK_SLIP, Motion
 from .oscillator import MAX_ITERATIONS, Oscillator, Point, SteadySliding
 
 REPEATS = 1e-9  # relative difference of states that repeat
+SETTLED = 1e-3  # of the first distance to steady sliding
 COLLAPSED = 1e-4  # share of the first rates at which an orbit has shrunk to steady sliding
 CLOSED = 1e-8  # the same of the ends of an orbit
 MAX_TURNS = 64  # without sticking
@@ -93,7 +94,7 @@ class ReturnMap:
     def follow_returns(self, y: np.ndarray, count: int) -> Ending:
         """Follow the motion from states y until its returns repeat, or it turns without sticking.
 
-        It returns at the ends of sticks; under a force, after each period.
+        It returns to the section; under a force, after each period.
         """
         oscillator, period = self.oscillator, self.oscillator.forced_period
         path, returns, maxima = list[Point](), list[Point](), list[tuple[Point, Point]]()
@@ -106,7 +107,7 @@ class ReturnMap:
                 maxima.append((last, new))
             if last.sticks and not new.sticks:
                 maxima.clear()
-            if new.t == len(returns) * period if period else last.sticks and not new.sticks:
+            if new.t == len(returns) * period if period else oscillator.is_return(last, new):
                 for old in returns[: -MAX_MULTIPLE - 1 : -1]:
                     difference = self.distance(old.y, new.y) / scale if old.modes == new.modes else inf
                     closest = min(closest, difference)
@@ -153,6 +154,10 @@ class ReturnMap:
         """Return whether the state that measures the motion has a maximum between two points."""
         return self.oscillator.measure(last.f) > 0.0 >= self.oscillator.measure(point.f)
 
+    def approaches(self, steady: SteadySliding | None, y: np.ndarray, end: Ending) -> bool:
+        """Return whether the motion from states y to an end has nearly settled to steady sliding."""
+        return steady is not None and self.distance(end.y, steady.y) <= SETTLED * self.distance(y, steady.y)
+
     # ---- orbits
 
     def find_orbit(self, end: Ending) -> Motion:
@@ -182,7 +187,10 @@ class ReturnMap:
         speed = float(np.abs(oscillator.reduce(oscillator.begin(y).f)).max())
         is_free = not oscillator.is_forced
         for _ in range(MAX_ITERATIONS):
-            end, slopes = oscillator.differentiate(y, period)
+            try:
+                end, slopes = oscillator.differentiate(y, period)
+            except HarnessError as error:  # states far from all motions
+                raise NoOrbitError(f"Newton's method does not converge: {error}") from None
             monodromy = basis.T @ slopes @ basis
             residual, scale = oscillator.reduce(end - y), float(np.abs(oscillator.reduce(y)).max()) or 1.0
             size = float(np.abs(residual).max())
@@ -201,7 +209,7 @@ class ReturnMap:
                 break
             y = y + basis @ change[: len(monodromy)]
             period += float(change[-1]) if is_free else 0.0
-            if not (np.isfinite(y).all() and 0.1 * guess < period < 10.0 * guess):
+            if not (np.abs(change[: len(monodromy)]).max() <= scale and 0.1 * guess < period < 10.0 * guess):
                 raise NoOrbitError("Newton's method does not converge")
         return self.measure_orbit(y, period, self.select_multipliers(monodromy))
 
@@ -251,19 +259,7 @@ class ReturnMap:
 
     def locate_turn(self, last: Point, point: Point) -> Point:
         """Return the point between two points, at which the state that measures the motion turns."""
-        found = [point]
-
-        def speed(h: float) -> float:
-            self.oscillator.begin(last.y)
-            found[0] = self.oscillator.step(0.0, h)
-            return self.oscillator.measure(found[0].f)
-
-        h = point.t - last.t
-        low, high = self.oscillator.measure(last.f), self.oscillator.measure(point.f)
-        if high and low * high < 0.0:
-            root = brentq(lambda s: low if s == 0.0 else high if s == h else speed(s), 0.0, h, xtol=1e-15, rtol=1e-15)
-            speed(max(float(root), 1e-12 * h))
-        return found[0]._replace(t=last.t + found[0].t)
+        return self.oscillator.locate(last, point, lambda at: self.oscillator.measure(at.f))
 
     # ---- one body with one contact, around steady sliding
 

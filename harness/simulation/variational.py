@@ -134,9 +134,9 @@ class Known:
         return SHIFT * abs(self.value) or SHIFT
 
 
-def has_capability(folder: Path, *names: str) -> bool:
-    """Return whether an unpacked FMU has a capability for model exchange, by its names in FMI 2.0 and 3.0."""
-    interface = etree.parse(str(folder / DESCRIPTION_FILE)).getroot().find("ModelExchange")  # fmpy reads FMI 2.0 only
+def has_capability(folder: Path, *names: str, interface_name: str = "ModelExchange") -> bool:
+    """Return whether an unpacked FMU has a capability for an interface, by its names in FMI 2.0 and 3.0."""
+    interface = etree.parse(str(folder / DESCRIPTION_FILE)).getroot().find(interface_name)  # fmpy reads FMI 2.0 only
     return interface is not None and any(interface.get(name) in ("true", "1") for name in names)
 
 

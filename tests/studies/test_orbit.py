@@ -1,14 +1,18 @@
 """Periodic motions of built FMUs, against closed forms, a transcendental equation and a solver of scipy."""
 
+import re
 import shutil
 from functools import cache
 from math import atan, pi, sqrt
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import commands
 import mpmath
 import numpy as np
 import pytest
 from build_cache import build_user_model
+from external_fmus import edited_copy
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
@@ -25,6 +29,15 @@ def native(name):
     require_compiler()
     (file,) = (commands.ROOT / "fmus").glob(f"**/{name}.py")
     return build_user_model(file, "--native", "--platform", "linux64") / "native" / f"{name}.fmu"
+
+
+def build_text(name, text):
+    """Return the native FMU of a model file with a text."""
+    require_compiler()
+    with TemporaryDirectory() as folder:
+        file = Path(folder, f"{name}.py")
+        file.write_text(text, encoding="utf-8")
+        return build_user_model(file, "--native", "--platform", "linux64") / "native" / f"{name}.fmu"
 
 
 def motion(result, kind):
@@ -111,11 +124,8 @@ def return_to_belt(v_belt, x):
 
 
 @pytest.mark.slow
-def test_a_reversal_of_the_slip_is_no_stick(tmp_path):
-    require_compiler()
-    (tmp_path / "reversing.py").write_text(REVERSING, encoding="utf-8")
-    folder = build_user_model(tmp_path / "reversing.py", "--native", "--platform", "linux64")
-    result = harness.orbit(folder / "native" / "reversing.fmu", over={"v_b": [0.7, 0.95, 1.2]})
+def test_a_reversal_of_the_slip_is_no_stick():
+    result = harness.orbit(build_text("reversing", REVERSING), over={"v_b": [0.7, 0.95, 1.2]})
     (point,) = result.points
     kinds = [(item.value, item.kind) for item in result.motions if item.kind != STEADY]
     assert (point.kind, kinds) == ("stick-slip ends", [(0.7, STICK_SLIP), (0.95, SLIDING), (1.2, SLIDING)])
@@ -152,14 +162,6 @@ class Meeting(Model):
 '''
 
 
-@cache
-def meeting(folder):
-    """Return the native FMU of Meeting."""
-    require_compiler()
-    (folder / "meeting.py").write_text(MEETING, encoding="utf-8")
-    return build_user_model(folder / "meeting.py", "--native", "--platform", "linux64") / "native" / "meeting.fmu"
-
-
 def growth_of_amplitude(c0, start, c2=0.1, c4=0.1):
     """Return by how much a turning point of Meeting has moved outwards after a turn from x = 0.1 + start."""
 
@@ -175,9 +177,9 @@ def growth_of_amplitude(c0, start, c2=0.1, c4=0.1):
 
 
 @pytest.mark.slow
-def test_two_orbits_meet_in_a_fold(tmp_path):
+def test_two_orbits_meet_in_a_fold():
     """Also where they lie between two of the amplitudes that are scanned."""
-    result = harness.orbit(meeting(tmp_path), over={"c0": [-0.02, -0.012, -0.01]})
+    result = harness.orbit(build_text("meeting", MEETING), over={"c0": [-0.02, -0.012, -0.01]})
     (point,) = result.points
     orbits = [(item.value, item.stability) for item in result.motions if item.kind == SLIDING]
     assert orbits == [(value, stability) for value in (-0.012, -0.01) for stability in ("unstable", "stable")]
@@ -190,9 +192,9 @@ def test_two_orbits_meet_in_a_fold(tmp_path):
     assert point.value == pytest.approx(brentq(largest, -0.0125, -0.0115, xtol=1e-13), abs=1e-10)
 
 
-def test_an_orbit_is_found_where_large_amplitudes_are_overdamped(tmp_path):
+def test_an_orbit_is_found_where_large_amplitudes_are_overdamped():
     """A motion that starts with a large amplitude does not turn there, and needs many steps."""
-    result = harness.orbit(meeting(tmp_path), {"v_b": 3.0, "c2": 1.0, "c4": 1.0})
+    result = harness.orbit(build_text("meeting", MEETING), {"v_b": 3.0, "c2": 1.0, "c4": 1.0})
     assert not result.remarks
     for orbit in result.motions[1:]:
         amplitude = orbit.largest - 0.1
@@ -310,11 +312,8 @@ class Clocked(Model):
         pytest.param("rad", "Omega", "clock", {}, marks=pytest.mark.slow),
     ],
 )
-def test_a_force_by_a_clock_has_the_amplitude_of_den_hartog(unit, rate, angle, options, tmp_path):
-    require_compiler()
-    text = CLOCKED.replace("UNIT", repr(unit)).replace("RATE", rate).replace("ANGLE", angle)
-    (tmp_path / "clocked.py").write_text(text, encoding="utf-8")
-    fmu = build_user_model(tmp_path / "clocked.py", "--native", "--platform", "linux64") / "native" / "clocked.fmu"
+def test_a_force_by_a_clock_has_the_amplitude_of_den_hartog(unit, rate, angle, options):
+    fmu = build_text("clocked", CLOCKED.replace("UNIT", repr(unit)).replace("RATE", rate).replace("ANGLE", angle))
     (orbit,) = harness.orbit(fmu, **options).motions
     assert orbit.amplitude == pytest.approx(hartog(7.0), rel=1e-10)
     (twin,) = harness.orbit(native("forced"), {"Omega": 7.0}).motions
@@ -417,6 +416,109 @@ def test_a_motion_that_does_not_repeat_is_named_and_not_drawn():
         result.plot()
 
 
+PAIR = '''
+from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State
+
+
+class Pair(Model):
+    """Two blocks on a belt, joined by a spring; friction falls with the slip."""
+
+    v_b = Parameter(1.2, "m/s", "speed of the belt")
+    c = Parameter(0.2, "N.s/m", "damping of each block")
+    x1_0 = Fixed(1.0, "m", "initial position")
+    v1_0 = Fixed(0.0, "m/s", "initial speed")
+    x2_0 = Fixed(0.8, "m", "initial position")
+    v2_0 = Fixed(0.0, "m/s", "initial speed")
+    m = Parameter(1.0, "kg", "mass of each block")
+    k = Parameter(1.0, "N/m", "stiffness to the wall")
+    k12 = Parameter(1.2, "N/m", "stiffness between the blocks")
+    f1 = Parameter(1.0, "N", "friction at rest")
+    f2 = Parameter(1.3, "N", "friction at rest")
+    g = Parameter(3.0, "s/m", "fall of friction")
+    x1 = State("m", "position", start=x1_0)
+    v1 = State("m/s", "speed", start=v1_0, rate_of=x1)
+    x2 = State("m", "position", start=x2_0)
+    v2 = State("m/s", "speed", start=v2_0, rate_of=x2)
+    mode1 = Mode()
+    mode2 = Mode()
+    F1 = Contact("N", "friction", mode=mode1, slip=v1 - v_b, slide=f1 / (1 + g * abs(v1 - v_b)), hold=f1)
+    F2 = Contact("N", "friction", mode=mode2, slip=v2 - v_b, slide=f2 / (1 + g * abs(v2 - v_b)), hold=f2)
+    a1 = Output("m/s2", "acceleration", (-k * x1 + k12 * (x2 - x1) - c * v1 - F1) / m, rate_of=v1)
+    a2 = Output("m/s2", "acceleration", (-k * x2 - k12 * (x2 - x1) - c * v2 - F2) / m, rate_of=v2)
+'''
+
+
+@cache
+def pair():
+    """Return the native FMU of Pair."""
+    return build_text("pair", PAIR)
+
+
+def follow_pair(y, v_b, stop):
+    """Return the states of Pair after a time in s, by scipy with located events."""
+    k, k12, c, static = 1.0, 1.2, 0.2, np.array([1.0, 1.3])
+    y, t, modes = np.array(y), 0.0, [-1, -1]  # signs of the slips; 0 sticks
+
+    def loads(y):
+        x, v = y[[0, 2]], y[[1, 3]]
+        return -k * x + k12 * (x[::-1] - x) - c * v
+
+    def rates(t, y):
+        slip = y[[1, 3]] - v_b
+        a = np.where(modes, loads(y) - np.sign(modes) * static / (1 + 3.0 * np.abs(slip)), 0.0)
+        return np.array([y[1], a[0], y[3], a[1]])
+
+    def leaves(i):
+        def event(t, y):
+            return np.abs(loads(y))[i] - static[i] if modes[i] == 0 else -modes[i] * (y[2 * i + 1] - v_b)
+
+        event.terminal, event.direction = True, 1
+        return event
+
+    while t < stop:
+        options = {"rtol": 1e-13, "atol": 1e-15, "max_step": 0.05, "events": (leaves(0), leaves(1))}
+        part = solve_ivp(rates, (t, stop), y, "DOP853", **options)
+        t, y = part.t[-1], part.y[:, -1]
+        for i in range(2):
+            if len(part.t_events[i]):
+                modes[i] = int(np.sign(loads(y)[i])) if modes[i] == 0 else 0
+                y[2 * i + 1] = v_b
+    return y
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("section", [None, "x1", "mode1"])
+def test_an_orbit_of_two_blocks_is_found_by_each_section_and_repeats_in_scipy(section):
+    result = harness.orbit(pair(), {"v_b": 0.8}, section=section)
+    orbit = motion(result, STICK_SLIP)
+    assert (orbit.n_sticks, orbit.stability) == (2, "stable")
+    assert orbit.period == pytest.approx(3.5388039025118, rel=1e-11)
+    if section:
+        np.testing.assert_allclose(follow_pair(orbit.y, 0.8, orbit.period), orbit.y, atol=1e-10)
+    marked = result.paths[-1][result.paths[-1][:, 3] > 0.0]
+    assert len(marked) == (2 if section is None else 1)
+    if section == "x1":
+        assert abs(marked[0, 1]) < 1e-12
+
+
+@pytest.mark.slow
+def test_of_several_blocks_both_motions_are_followed_from_either_side():
+    """Steady sliding turns stable where an eigenvalue crosses zero; stick-slip goes on from the speed below."""
+    start = {"x1_0": 0.86, "v1_0": 0.25, "x2_0": -0.13, "v2_0": -0.26}
+    result = harness.orbit(pair(), start, over={"v_b": [0.8, 1.2, 1.6]})
+
+    def growth(v):
+        fall = 3.0 / (1 + 3.0 * v) ** 2
+        rows = [0, 1, 0, 0], [-2.2, fall - 0.2, 1.2, 0], [0, 0, 0, 1], [1.2, 0, -2.2, 1.3 * fall - 0.2]
+        return np.linalg.eigvals(np.array(rows)).real.max()
+
+    (point,) = result.points
+    assert point.kind == "steady sliding turns stable"
+    assert point.value == pytest.approx(brentq(growth, 0.9, 1.2, xtol=1e-14), rel=1e-11)
+    kinds = [(item.value, item.kind, item.stability) for item in result.motions]
+    assert kinds[2:] == [(v, kind, "stable") for v in (1.2, 1.6) for kind in (STEADY, STICK_SLIP)]
+
+
 @pytest.mark.slow
 def test_of_a_python_fmu_its_native_twin_is_run(tmp_path):
     require_compiler()
@@ -434,6 +536,7 @@ def test_of_a_python_fmu_its_native_twin_is_run(tmp_path):
         ({"over": {"v_belt": [1.0, 2.0], "c": [0.0, 1.0]}}, "give one"),
         ({"over": {"speed": [1.0, 2.0]}}, "unknown parameter 'speed'"),
         ({"values": {"v_belt": 1.0}, "over": {"v_belt": [1.0, 2.0]}}, "both varied and set"),
+        ({"section": "speed"}, "unknown section 'speed'"),
     ],
 )
 def test_arguments_are_refused_in_one_sentence(arguments, message):
@@ -474,6 +577,52 @@ def test_the_map_of_the_belt_has_the_edges_of_closed_forms():
         assert edge.point == pytest.approx((c, edge_of_stick_slip(c)), rel=1e-11)
     shared = harness.map_motions(native("belt"), over, {"law": "coulomb"}, workers=2)
     assert shared.edges == result.edges
+
+
+@pytest.mark.slow
+def test_a_map_of_an_fmu_of_another_tool_counts_returns_by_its_saved_states(tmp_path):
+    """Without the variables that expose its steps, the belt is such an FMU."""
+    rename = {"modelDescription.xml": lambda text: text.replace("solver.t_next", "solver.next")}
+    fmu = edited_copy(native("belt"), tmp_path / "other.fmu", rename)
+    over, values = {"v_belt": [0.1, 0.3]}, {"law": "coulomb", "c": 0.2, "solver.rtol": 1e-12}
+    result = harness.map_motions(fmu, {"v_belt": [0.1, 0.2, 0.3]}, values, section="v")
+    (edge,) = result.edges
+    assert (edge.below, edge.above) == ("1 return in a period", "no return")
+    assert edge.point[0] == pytest.approx(edge_of_stick_slip(0.2), rel=1e-10)
+    with pytest.raises(harness.SceneError, match="name a section, one of its outputs, or a measure"):
+        harness.map_motions(fmu, over, values)
+    with pytest.raises(harness.SceneError, match="unknown section 'speed'"):
+        harness.map_motions(fmu, over, values, section="speed")
+    without = {"modelDescription.xml": lambda text: re.sub(r'can\w+FMUstate="true"', "", text)}
+    other = edited_copy(fmu, tmp_path / "none.fmu", without)
+    with pytest.raises(harness.HarnessError, match="does not save its states"):
+        harness.map_motions(other, over, values, section="v")
+
+
+def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
+    m, k, mu_s, g, speed, stop = 12.5, 742.5, 0.9, 9.81, 0.034, 16.0
+    frequency = sqrt(k / m)
+
+    def start_of_slip(mu_d, number):
+        fall = (mu_s - mu_d) * m * g / k
+        period = 2 * fall / speed + 2 / frequency * (pi - atan(fall * frequency / speed))
+        return mu_s * m * g / (k * speed) + (number - 1) * period
+
+    result = harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.5, 0.7]}, measure="slips")
+    assert result.labels == ("slips 2", "slips 3", "slips 5")
+    for edge, number in zip(result.edges, (3, 4, 5), strict=True):
+        exact = brentq(lambda mu_d, n=number: start_of_slip(mu_d, n) - stop, 0.3, 0.8, xtol=1e-15)
+        assert edge.point[0] == pytest.approx(exact, rel=1e-11)
+    with pytest.raises(harness.SceneError, match="is not a whole number: give the levels"):
+        harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.7]}, measure="peak_speed")
+    levels = harness.map_motions(
+        native("stickslip"), {"mu_d": [0.3, 0.5, 0.7]}, measure="peak_speed", levels=[0.3, 0.5]
+    )
+    assert levels.labels == ("0.5 <= peak_speed", "0.5 <= peak_speed", "peak_speed < 0.3")
+    for edge, level in zip(levels.edges, (0.5, 0.3), strict=True):  # in closed form
+        assert speed + sqrt((frequency * (mu_s - edge.point[0]) * m * g / k) ** 2 + speed**2) == pytest.approx(
+            level, rel=1e-4
+        )
 
 
 @pytest.mark.slow

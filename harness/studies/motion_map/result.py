@@ -63,6 +63,8 @@ class MapResult(Result):
         Number of runs of the FMU.
     settings : dict
         Values of the other parameters.
+    options : dict
+        Period, section, measure and levels, as far as they are given.
     """
 
     study, _function = "map", "map_motions"
@@ -74,6 +76,7 @@ class MapResult(Result):
     edges: tuple[Edge, ...]
     n_runs: int
     settings: dict[str, Any]
+    options: dict[str, Any]
 
     @property
     def title(self) -> str:
@@ -135,7 +138,9 @@ class MapResult(Result):
 
     def _origin(self) -> dict[str, Any]:
         fmu, parameters = self.spec.fmu, {name: (value, "") for name, value in self.settings.items()}
-        return {"files": [fmu], "parameters": parameters, "source": describe_sources(str(fmu)), "run": self.spec}
+        return {"files": [fmu], "parameters": parameters, "source": describe_sources(str(fmu)), "run": self.spec} | {
+            "scene": self.options
+        }
 
     def _write_tables(self, folder: Path) -> None:
         self._data_table().write_csv(folder / "map.csv")

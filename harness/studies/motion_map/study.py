@@ -1,29 +1,34 @@
 """What motions end in at the points of a grid, and the edges between them along its lines, by bisection."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from threading import Lock
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ...errors import HarnessError
+from ...analyses.measured_runs import OUTPUT_MEASURES, SweepSpec, open_runner
+from ...errors import HarnessError, SceneError, check_names
 from ...process.interrupt import check_interrupt
 from ...process.temporary_directory import temporary_directory
 from ...process.workers import open_workers
+from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
 from ...simulation.edges import find_edges
-from ...simulation.fmu_archive import PROCESS_RESOURCES
-from ...simulation.native_equivalent import native_with_derivatives
-from ...simulation.oscillator import Oscillator, open_oscillator
-from ...simulation.poincare import CYCLE, ReturnMap
+from ...simulation.fmu_archive import PROCESS_RESOURCES, declared_parameters, exposes_solver_steps, read_description
+from ...simulation.motion import SLIDING_ORBIT, STEADY, STICK_SLIP, count_text
+from ...simulation.native_equivalent import native_equivalent, native_with_derivatives
+from ...simulation.oscillator import Oscillator, SteadySliding, open_oscillator
+from ...simulation.poincare import CYCLE, IRREGULAR, TURNING, NoOrbitError, ReturnMap
+from ...simulation.saved_states import SavedStateMotion
 from .result import Edge, MapResult
 
-STEADY, STICK_SLIP, BOTH, NEITHER = "steady sliding", "stick-slip", "steady sliding or stick-slip", "neither"
+BOTH, NEITHER = f"{STEADY} or {STICK_SLIP}", "neither"
 
 BUSY = Lock()  # messages of FMUs are captured by one thread at a time
 
@@ -36,40 +41,167 @@ class Line(NamedTuple):
     n_runs: int
 
 
-class LineSearch:
-    """Labels the points of a line of the grid, and finds the edges between them."""
+class MapRequest(NamedTuple):
+    """What a map shows of an FMU: names of its axes, and what its regions are.
+
+    `period` in s, and `section`, are those of `Oscillator`. With a `measure` of a sweep the regions are its values, or
+    the intervals between increasing `levels`.
+    """
+
+    spec: RunSpec
+    names: tuple[str, ...]
+    period: float | None = None
+    section: str = ""
+    measure: str = ""
+    levels: tuple[float, ...] = ()
+
+
+class Labels(Protocol):
+    """Names of what motions do at points of the parameters."""
+
+    @property
+    def n_runs(self) -> int: ...
+
+    def label(self, point: np.ndarray) -> str: ...
+
+
+class MotionLabels:
+    """What motions of an oscillator end in.
+
+    Of one body that slides steadily, this is exact: by the eigenvalues of steady sliding, and by whether a motion that
+    has stuck sticks again. Of any other model it is what the motions end in that begin at its start, and at the ends of
+    motions at the nearest points on either side.
+    """
 
     def __init__(self, oscillator: Oscillator) -> None:
         self.oscillator, self.map = oscillator, ReturnMap(oscillator)
+        self.ends: dict[tuple[float, ...], dict[str, np.ndarray]] = {}  # states by name, at points in their order
+
+    @property
+    def n_runs(self) -> int:
+        return self.oscillator.n_runs
 
     def label(self, point: np.ndarray) -> str:
-        """Return what motions end in.
-
-        Of one body that slides steadily, this is exact: by the eigenvalues of steady sliding, and by whether a motion
-        that has stuck sticks again. Of any other model it is what the motion from its start ends in.
-        """
+        """Return what motions end in."""
         self.oscillator.set_point(point.tolist())
         steady = self.oscillator.find_steady_sliding()
         if steady is not None and self.oscillator.is_one_body:
             sticks = self.map.sticks_again(steady)
             return {(1, 0): STEADY, (0, 1): STICK_SLIP, (1, 1): BOTH, (0, 0): NEITHER}[steady.growth < 0.0, sticks]
-        end = self.map.run_long(self.oscillator.start)
-        return f"{end.n_sticks} sticks in a period" if end.kind == CYCLE else end.kind
+        found = {} if steady is None or steady.growth >= 0.0 else {STEADY: steady.y}
+        key = tuple(point.tolist())
+        at = sorted([*self.ends, key]).index(key)
+        neighbours = [self.ends[other] for other in sorted(self.ends.keys() - {key})[max(at - 1, 0) : at + 1]]
+        starts = {name: y for ends in neighbours for name, y in ends.items()}
+        for name, y in [("", self.oscillator.start), *starts.items()]:
+            end, y = self.describe_end(y, steady) if name not in found else (IRREGULAR, y)
+            if end != IRREGULAR or not name:  # it may also be on the way to another motion
+                found.setdefault(end, y)
+        self.ends[key] = {name: y for name, y in found.items() if name != IRREGULAR}
+        return " or ".join(sorted(found))
 
-    def search(self, points: np.ndarray) -> Line:
-        """Label the points (n, axes) of a line, of which one coordinate varies, and bisect between different ones."""
-        before, edges = self.oscillator.n_runs, list[Edge]()
-        labels = [self.label(point) for point in points]
-        for (one, two), (a, b) in zip(pairwise(labels), pairwise(points), strict=True):
-            for low, high, *names in find_edges(self.label, a, b, one, two):
-                edges.append(Edge(tuple((0.5 * (low + high)).tolist()), *names))
-        return Line(labels, edges, self.oscillator.n_runs - before)
+    def describe_end(self, y: np.ndarray, steady: SteadySliding | None) -> tuple[str, np.ndarray]:
+        """Return name and states of what the motion from states y ends in."""
+        end = self.map.run_long(y)
+        if end.kind == TURNING:
+            try:
+                if not self.map.approaches(steady, y, end):
+                    return SLIDING_ORBIT, self.map.find_orbit(end).y
+            except NoOrbitError:
+                pass
+            return STEADY if steady is not None and steady.growth < 0.0 else IRREGULAR, end.y
+        return (count_text(end.n_sticks, "stick") if end.kind == CYCLE else end.kind), end.y
 
 
-def search_line(spec: RunSpec, fmu: bytes, names: tuple[str, ...], period: float | None, points: np.ndarray) -> Line:
+class ReturnLabels:
+    """How often motions of any FMU return to a section in a period."""
+
+    def __init__(self, motion: SavedStateMotion) -> None:
+        self.motion = motion
+
+    @property
+    def n_runs(self) -> int:
+        return self.motion.n_runs
+
+    def label(self, point: np.ndarray) -> str:
+        """Return the number of returns in a period."""
+        count = self.motion.count_returns(point.tolist())
+        return IRREGULAR if count != count else count_text(int(count), "return") if count else "no return"
+
+
+class MeasureLabels:
+    """Values of a measure of a sweep: whole numbers, or the intervals between levels."""
+
+    def __init__(self, request: MapRequest, resources: ExitStack) -> None:
+        measure, levels = request.measure, request.levels
+        family = measure.partition("_")[0]
+        names = (family if family in OUTPUT_MEASURES else measure,)
+        self.runner = resources.enter_context(
+            open_runner(SweepSpec(replace(request.spec, follow=False), request.names, names))
+        )
+        columns = [column.name for column in self.runner.columns]
+        check_names("measure", [measure], columns)
+        self.measure, self.levels, self.column, self.n_runs = measure, levels, columns.index(measure), 0
+
+    def label(self, point: np.ndarray) -> str:
+        """Return the measure."""
+        self.n_runs += 1
+        row = self.runner.run(point.tolist())
+        if isinstance(row, str):
+            raise HarnessError(row)
+        value = row[self.column]
+        if value != value:
+            return f"no {self.measure}"
+        if not self.levels:
+            if value % 1.0:
+                raise SceneError(f"{self.measure} = {value:.6g} is not a whole number: give the levels between regions")
+            return f"{self.measure} {value:.0f}"
+        below = int(np.searchsorted(self.levels, value, side="right"))
+        bounds = [f"{level:g}" for level in self.levels]
+        ends = (
+            [f"{bounds[below - 1]} <= "] * (below > 0),
+            [f" < {bounds[min(below, len(bounds) - 1)]}"] * (below < len(bounds)),
+        )
+        return "".join([*ends[0], self.measure, *ends[1]])
+
+
+@contextmanager
+def open_labels(request: MapRequest) -> Iterator[Labels]:
+    """Open what a request asks of its FMU."""
+    with ExitStack() as resources:
+        if request.measure:
+            yield MeasureLabels(request, resources)
+        elif exposes_solver_steps(read_description(request.spec.fmu, request.spec.lenient)):
+            options = request.period, request.section
+            yield MotionLabels(resources.enter_context(open_oscillator(request.spec, request.names, *options)))
+        else:
+            yield ReturnLabels(SavedStateMotion(request.spec, request.names, request.section, resources))
+
+
+def search_points(labels: Labels, points: np.ndarray) -> Line:
+    """Label the points (n, axes) of a line, of which one coordinate varies, and bisect between different ones."""
+    before, edges = labels.n_runs, list[Edge]()
+    names = [labels.label(point) for point in points]
+    if isinstance(labels, MotionLabels) and labels.ends:  # motions that were found later may exist at earlier points
+        names = [labels.label(point) for point in points[::-1]][::-1] if len({*names}) > 1 else names
+    is_final = False
+    while not is_final:
+        is_final, edges = True, []
+        for number, (a, b) in enumerate(pairwise(points)):
+            for low, high, *sides in find_edges(labels.label, a, b, names[number], names[number + 1]):
+                edges.append(Edge(tuple((0.5 * (low + high)).tolist()), *sides))
+                for at, end in ((number, low), (number + 1, high)):
+                    if (end == points[at]).all():  # motions that were followed up to this point
+                        name, names[at] = names[at], labels.label(end)
+                        is_final &= names[at] == name
+    return Line(names, edges, labels.n_runs - before)
+
+
+def search_line(request: MapRequest, fmu: bytes, points: np.ndarray) -> Line:
     """Search a line in a worker, which may not have the file of the FMU."""
-    with BUSY, open_oscillator(replace(spec, fmu=store_fmu(spec.fmu.name, fmu)), names, period) as oscillator:
-        return LineSearch(oscillator).search(points)
+    local = request._replace(spec=replace(request.spec, fmu=store_fmu(request.spec.fmu.name, fmu)))
+    with BUSY, open_labels(local) as labels:
+        return search_points(labels, points)
 
 
 @cache
@@ -91,27 +223,24 @@ def grid_lines(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 
 def compute_map(
-    spec: RunSpec,
-    axes: dict[str, np.ndarray],
+    request: MapRequest,
+    grid: tuple[np.ndarray, ...],
     workers: int | None,
     scheduler: str | None = None,
-    period: float | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> MapResult:
-    """Find what motions end in over one or two parameters.
+    """Find what motions do over one or two parameters.
 
     Parameters
     ----------
-    spec : RunSpec
-        FMU and values.
-    axes : dict of numpy.ndarray
+    request : MapRequest
+        FMU, its parameters that vary, and what the regions are.
+    grid : tuple of numpy.ndarray
         Increasing values (n,) of each parameter.
     workers : int or None
         Number of worker processes; None for this process.
     scheduler : str or None
         Address of the scheduler of a Dask cluster, whose workers are used.
-    period : float or None
-        Period in s of the inputs, or of forces that depend on a clock.
     report : callable
         Receives the progress from 0 to 1.
 
@@ -122,12 +251,12 @@ def compute_map(
     HarnessError
         If the FMU is not suitable, or a worker dies.
     """
-    names, run = tuple(axes), replace(spec, fmu=native_with_derivatives(spec.fmu))
-    lines, grid = grid_lines([*axes.values()]), tuple(axes.values())
-    with open_oscillator(run, names, period) as oscillator:
-        units = {name: oscillator.units[name] for name in names}
-        settings = {name: oscillator.default(name) for name in oscillator.parameters if name not in names}
-    content = run.fmu.read_bytes()
+    spec, names = request.spec, request.names
+    check_built(spec.fmu, SceneError)
+    fmu, lines = native_equivalent(spec.fmu), grid_lines(grid)
+    if not request.measure and exposes_solver_steps(read_description(fmu, spec.lenient)):
+        fmu = native_with_derivatives(fmu)
+    content, run = fmu.read_bytes(), request._replace(spec=replace(spec, fmu=fmu))
     with open_workers(scheduler, workers, len(lines)) as pool:
         futures: dict[Future[Line], int] = {}
         results = dict[int, Line]()
@@ -135,7 +264,7 @@ def compute_map(
             check_interrupt()
             while len(futures) < 2 * max(1, pool.size) and len(results) + len(futures) < len(lines):
                 number = len(results) + len(futures)
-                futures[pool.submit(search_line, run, content, names, period, lines[number])] = number
+                futures[pool.submit(search_line, run, content, lines[number])] = number
             for future in pool.wait_for_any(futures):
                 try:
                     results[futures.pop(future)] = future.result()
@@ -146,4 +275,9 @@ def compute_map(
     first_lines = ordered[: len(grid[-1]) if len(grid) > 1 else 1]  # those along the first parameter have all points
     labels = tuple(label for line in first_lines for label in line.labels)
     edges = tuple(edge for line in ordered for edge in line.edges)
-    return MapResult(spec, units, grid, labels, edges, sum(line.n_runs for line in ordered), settings)
+    parameters = declared_parameters(fmu)
+    settings = {name: spec.values.get(name, start) for name, (start, _) in parameters.items() if name not in names}
+    units = {name: parameters[name][1] for name in names}
+    options = {name: value for name in MapRequest._fields[2:] if (value := getattr(request, name))}
+    n_runs = sum(line.n_runs for line in ordered)
+    return MapResult(spec, units, grid, labels, edges, n_runs, settings, options)

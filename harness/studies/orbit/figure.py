@@ -61,7 +61,7 @@ def line_style(kind: str, stability: str) -> dict[str, Any]:
 
 
 def plot_phase_plane(axes: Axes, result: "OrbitResult") -> None:
-    """Plot the rate over the coordinate of all motions, with the section: the maximum of the coordinate."""
+    """Plot the rate over the coordinate of all motions, with the points at which they return."""
     for motion, path in zip(result.motions, result.paths, strict=True):
         label, style = (
             " ".join(filter(None, (motion.kind, motion.stability))),
@@ -70,8 +70,7 @@ def plot_phase_plane(axes: Axes, result: "OrbitResult") -> None:
         marker = "o" if len(path) == 1 else ""
         axes.plot(path[:, 1], path[:, 2], label=label, marker=marker, markersize=4, **style)
         if len(path) > 1:
-            row = path[path[:, 1].argmax()]
-            axes.plot(row[1], row[2], "s", color=style["color"], markersize=4)
+            axes.plot(*path[path[:, 3] > 0.0, 1:3].T, "s", color=style["color"], markersize=4)
     axes.set_xlabel(axis_label(result.coordinate, result.coordinate_unit))
     axes.set_ylabel(axis_label(f"d {result.coordinate} / dt", f"{result.coordinate_unit}/s"))
     axes.legend(**LEGEND_ABOVE, ncols=2)

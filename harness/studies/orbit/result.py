@@ -57,7 +57,7 @@ class OrbitResult(Result):
     points : tuple of SpecialPoint
         Special points.
     paths : tuple of numpy.ndarray
-        Without a parameter, a period (points, 3) of each motion: time in s, coordinate and rate.
+        Without a parameter, a period (points, 4) of each motion: time in s, coordinate, rate, and 1 where it returns.
     remarks : tuple of str
         What is neither at rest nor periodic.
     n_runs : int

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from math import inf, nan
 
 import numpy as np
@@ -23,6 +24,7 @@ from ...simulation.poincare import (
 from .result import OrbitResult, SpecialPoint
 
 PATH_POINTS = 400  # at least, of an orbit in the phase plane
+ENDS, BEGINS = "ends", "begins"
 NEAR = 1e-6  # relative difference of orbits that are the same
 
 
@@ -59,7 +61,7 @@ class BranchTracer:
                 motions.append(Motion(AT_REST, end.y, x, x))
             elif end.kind == IRREGULAR:
                 remarks.append(describe_irregular(end.closest))
-            elif steady is None or self.map.distance(end.y, steady.y) > NEAR * self.map.distance(seed, steady.y):
+            elif not self.map.approaches(steady, seed, end):
                 try:
                     orbits.append(self.map.find_orbit(end))
                 except NoOrbitError as error:
@@ -86,10 +88,16 @@ class BranchTracer:
         return Motion(STEADY, steady.y, x, x, period, growth=steady.growth, multipliers=multipliers)
 
     def trace_path(self, motion: Motion) -> np.ndarray:
-        """Return a period of a motion (points, 3): time in s, the state that measures it, and its rate."""
+        """Return a period of a motion (points, 4): time in s, the state that measures it, its rate, and 1 at returns.
+
+        Motions return to the section; one that does not pass it, to the maximum of the state.
+        """
         is_orbit, every = motion.kind in (STICK_SLIP, SLIDING_ORBIT), motion.period / PATH_POINTS
-        path = self.oscillator.follow(motion.y, motion.period if is_orbit else 0.0, every if is_orbit else inf)
-        return np.array([(p.t, self.oscillator.measure(p.y), self.oscillator.measure(p.f)) for p in path])
+        path = [*self.oscillator.follow(motion.y, motion.period if is_orbit else 0.0, every if is_orbit else inf)]
+        passes = [False, *(self.oscillator.is_return(*pair) for pair in pairwise(path))]
+        x = np.array([self.oscillator.measure(point.y) for point in path])
+        passes = passes if any(passes) else x == x.max()
+        return np.column_stack([[p.t for p in path], x, [self.oscillator.measure(p.f) for p in path], passes])
 
     # ---- special points between two values
 
@@ -105,12 +113,8 @@ class BranchTracer:
                 points.append(self.locate_stability(low, high))
             if sticks[0] != sticks[1] and self.oscillator.is_one_body:
                 points.append(self.locate_grazing(low, high, sticks[0]))
-            if not points and abs(len(sliding[0]) - len(sliding[1])) == 2:
+            if not points and self.oscillator.is_one_body and abs(len(sliding[0]) - len(sliding[1])) == 2:
                 points.append(self.locate_fold(low, high, *sliding))
-        elif len(one) == len(two) == 1 and not (steady[0] or steady[1]):
-            a, b = one[0], two[0]
-            if a.n_sticks != b.n_sticks or a.kind != b.kind:
-                points.append(self.locate_sticks(a, b))
         return points
 
     def steady_sliding(self, value: float) -> SteadySliding:
@@ -162,23 +166,45 @@ class BranchTracer:
         value = value_of(best.x)
         return SpecialPoint(value, "fold: two orbits meet", x + best.x, "extreme value along the branch")
 
-    def locate_sticks(self, a: Motion, b: Motion) -> SpecialPoint:
-        """Return the value at which the number of sticks in a period changes, by bisection."""
-        seed, n_remarks = [a], len(self.remarks)
+    def follow(self, one: list[Motion], two: list[Motion], value: float, change: str) -> list[SpecialPoint]:
+        """Follow motions to another value, where they are added to those with other names, or up to a special point.
 
-        def is_same_kind(value: float) -> bool:
-            found = self.find_motions(value, [seed[0].y])
-            if len(found) == 1 and (found[0].n_sticks, found[0].kind) == (a.n_sticks, a.kind):
-                seed[0] = found[0]
-                return True
-            return False
+        Around steady sliding of one body all motions are known.
+        """
+        points, names = list[SpecialPoint](), {motion.name for motion in two}
+        for motion in one if not (self.oscillator.is_one_body and any(item.kind == STEADY for item in two)) else ():
+            if motion.kind != STEADY and motion.name not in names:
+                seed, n_remarks = [motion], len(self.remarks)
 
-        ((edge, *_),) = find_edges(is_same_kind, a.value, b.value, True, False)
-        del self.remarks[n_remarks:]  # on values between these two
-        names = [
-            motion.kind if motion.kind == AT_REST else f"{motion.n_sticks} sticks in a period" for motion in (a, b)
-        ]
-        return SpecialPoint(edge, " become ".join(names), seed[0].largest, "bisection on the number of sticks")
+                def is_found(at: float, name: str = motion.name, seed: list[Motion] = seed) -> bool:
+                    found = [item for item in self.find_motions(at, [seed[0].y]) if item.name == name]
+                    seed[:] = found or seed
+                    return bool(found)
+
+                ((edge, end, *_),) = find_edges(is_found, motion.value, value, True, False)
+                if end == value and is_found(value):
+                    two.append(seed[0])
+                else:
+                    how = "bisection on whether it is found"
+                    points.append(SpecialPoint(edge, f"{motion.name} {change}", seed[0].largest, how))
+                del self.remarks[n_remarks:]  # on values between these two
+        return points
+
+
+def join_changes(points: list[SpecialPoint]) -> list[SpecialPoint]:
+    """Return the points in order, with the end of one motion where another one begins as one point."""
+    joined = list[SpecialPoint]()
+    for point in sorted(points, key=lambda point: (point.value, point.kind)):
+        last = joined[-1] if joined else point
+        kinds = sorted((last.kind, point.kind), key=lambda kind: kind.endswith(BEGINS))
+        is_near = abs(point.value - last.value) <= NEAR * abs(point.value)
+        if is_near and kinds[0].endswith(ENDS) and kinds[1].endswith(BEGINS):
+            joined[-1] = replace(
+                last, kind=f"{kinds[0].removesuffix(f' {ENDS}')} become {kinds[1].removesuffix(f' {BEGINS}')}"
+            )
+        else:
+            joined.append(point)
+    return joined
 
 
 def is_same(one: Motion, two: Motion) -> bool:
@@ -201,6 +227,7 @@ def compute_orbits(
     parameter: str = "",
     values: Sequence[float] = (),
     period: float | None = None,
+    section: str = "",
     report: Callable[[float], None] = lambda share: None,
 ) -> OrbitResult:
     """Find the periodic motions of an FMU, at one point or over a parameter.
@@ -215,6 +242,8 @@ def compute_orbits(
         Its increasing values.
     period : float or None
         Period in s of forces that depend on a clock.
+    section : str
+        What free motions return to, as in `Oscillator`.
     report : callable
         Receives the progress from 0 to 1.
 
@@ -226,18 +255,25 @@ def compute_orbits(
         If the FMU is not suitable.
     """
     run = replace(spec, fmu=native_with_derivatives(spec.fmu))
-    with open_oscillator(run, (parameter,) if parameter else (), period) as oscillator:
+    with open_oscillator(run, (parameter,) if parameter else (), period, section) as oscillator:
         tracer, motions, points = BranchTracer(oscillator), list[list[Motion]](), list[SpecialPoint]()
         for number, value in enumerate(values or (nan,)):
             seeds = [motion.y for motion in (motions[-1] if motions else ()) if motion.kind != STEADY]
             motions.append(tracer.find_motions(value, [*seeds, oscillator.start]))
-            if number and motions[-1] and motions[-2]:
-                try:
-                    points += tracer.locate(motions[-2], motions[-1])
-                except NoOrbitError as error:
-                    tracer.remarks.append(f"a special point below {tracer.name_value(value)} is not located: {error}.")
-            report((number + 1) / max(1, len(values)))
-        every = tuple(motion for found in motions for motion in found)
+            if number:
+                points += tracer.follow(motions[-2], motions[-1], value, ENDS)
+            report(0.8 * (number + 1) / max(1, len(values)))
+        for number in reversed(range(len(motions) - 1)):
+            points += tracer.follow(motions[number + 1], motions[number], values[number], BEGINS)
+        for number, (one, two) in enumerate(pairwise(motions), 1):
+            try:
+                points += tracer.locate(one, two) if one and two else []
+            except NoOrbitError as error:
+                name = tracer.name_value(values[number])
+                tracer.remarks.append(f"a special point below {name} is not located: {error}.")
+            report(0.8 + 0.2 * number / len(values))
+        points = join_changes(points)
+        every = tuple(motion for found in motions for motion in sorted(found, key=lambda motion: motion.amplitude))
         coordinate = oscillator.states[oscillator.coordinate]
         return OrbitResult(
             spec,

@@ -21,11 +21,11 @@ from typing import Self
 
 import numpy as np
 
+from ...analyses.measured_runs import BlockResult, SweepSpec, run_block, unload
 from ...errors import HarnessError
 from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, check_interrupt
 from ...process.temporary_directory import lock_path
 from ...process.workers import Workers, open_workers
-from .runner import BlockResult, SweepSpec, run_block, unload
 from .sampling import SweepPoints
 
 

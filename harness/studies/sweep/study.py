@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError, check_names, import_optional
+from ...analyses.measured_runs import MeasureColumn, SweepSpec, open_runner
+from ...errors import HarnessError, SceneError, check_varied, import_optional
 from ...results.files import column_heading
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
@@ -33,7 +34,6 @@ from ...simulation.model_data import LookupTable, read_tables_with
 from ...simulation.variable_values import REAL_TYPES, variable_unit
 from .dispatch import Checkpoint, Sweep, run_pending
 from .result import STUDY, FailureGroup, SweepResult
-from .runner import MeasureColumn, SweepSpec, open_runner
 from .sampling import SweepPoints, describe_labels, read_axis, read_labels
 
 if TYPE_CHECKING:
@@ -134,10 +134,8 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
     fmu_description = read_description(runs.run.fmu, runs.run.lenient)
     variables = {variable.name: variable for variable in fmu_description.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
-    check_names("parameter to vary", runs.varied, settable)
+    check_varied("parameter to vary", runs.varied, settable, runs.run.values)
     for axis in points.axes:
-        if axis.name in runs.run.values:
-            raise SceneError(f"{axis.name} is both varied and set; remove one of them")
         if variables[axis.name].type not in REAL_TYPES and any(value % 1 for value in axis.values):
             raise SceneError(f"{axis.name} is an enumeration; vary it over integers or labels, as in {axis.name}=1,2")
     with open_runner(runs) as runner:

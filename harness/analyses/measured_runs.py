@@ -14,21 +14,21 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.decrement import find_extrema_from_velocity
-from ...analyses.decay.law import damping_ratio, friction_from_envelope
-from ...analyses.slip import peak_value, slips_from_modes, upward_crossings
-from ...errors import HarnessError, check_names
-from ...process.temporary_directory import temporary_directory
-from ...scenes.roles import find_roles
-from ...scenes.run_spec import RunSpec
-from ...simulation.fmu_archive import read_description, resolve_time_span
-from ...simulation.fmu_instance import CALL_FAILURES
-from ...simulation.recorder import default_outputs
-from ...simulation.runner import open_session, runs_in_process
-from ...simulation.session import Session
-from ...simulation.signals import column_of_role
-from ...simulation.trajectory import Trajectory, effective_parameters, get_parameter
-from ...simulation.variable_values import variable_unit
+from ..errors import HarnessError, check_names
+from ..process.temporary_directory import temporary_directory
+from ..scenes.roles import find_roles
+from ..scenes.run_spec import RunSpec
+from ..simulation.fmu_archive import read_description, resolve_time_span
+from ..simulation.fmu_instance import CALL_FAILURES
+from ..simulation.recorder import default_outputs
+from ..simulation.runner import open_session, runs_in_process
+from ..simulation.session import Session
+from ..simulation.signals import column_of_role
+from ..simulation.trajectory import Trajectory, effective_parameters, get_parameter
+from ..simulation.variable_values import variable_unit
+from .decay.decrement import find_extrema_from_velocity
+from .decay.law import damping_ratio, friction_from_envelope
+from .slip import peak_value, slips_from_modes, upward_crossings
 
 N_STEPS = 400  # communication steps along a trajectory, in addition to the internal steps
 
