@@ -68,13 +68,11 @@ def friction_laws(model: Any) -> list[str]:
 
 
 def has_step_events(model: Any) -> bool:
-    """Return whether an importer must report its steps: friction laws without stick and slip change modes there."""
-    return any(law != HYBRID_LAW[0] for law in friction_laws(model))
+    """Return whether an importer must report its steps.
 
-
-def offers_model_exchange(model: Any) -> bool:
-    """Check whether an importer may use its own solver: contacts in a plane need that of the FMU."""
-    return not getattr(model, "planar_modes", ())
+    Friction laws without stick and slip change modes there, and contacts in a plane note the direction of their slip.
+    """
+    return hasattr(model, "planar_modes") or any(law != HYBRID_LAW[0] for law in friction_laws(model))
 
 
 def integrated_states(declared: Variables) -> Variables:
@@ -83,15 +81,14 @@ def integrated_states(declared: Variables) -> Variables:
 
 
 def all_variables(model: Any) -> Variables:
-    """Return name and declaration of all variables: declared ones, those for model exchange if offered, time."""
+    """Return name and declaration of all variables: declared ones, those for model exchange, time."""
     declared = declared_variables(model)
     meanings = dict(declared)
     added: Variables = []
     forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
     states = [meaning for _, meaning in integrated_states(declared)]
     speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
-    contacts = model.contacts.items() if offers_model_exchange(model) else ()
-    for (mode, slip), force in zip(contacts, forces, strict=bool(contacts)):
+    for (mode, slip), force in zip(model.contacts.items(), forces, strict=True):
         tail, of_mode = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
         stick_text = f"event indicator{of_mode}: speed in the direction of sliding; 1 while stuck"
         slip_text = f"event indicator{of_mode}: holding limit minus load on the body at rest; 1 while sliding"
@@ -99,7 +96,7 @@ def all_variables(model: Any) -> Variables:
             (TO_REST + tail, ContinuousLocal(meanings[slip].unit if slip else speed, stick_text)),
             (TO_BREAK_AWAY + tail, ContinuousLocal(force, slip_text)),
         ]
-    for n in range(model.n_event_functions - model.first_condition if offers_model_exchange(model) else 0):
+    for n in range(model.n_event_functions - model.first_condition):
         text = f"event indicator of condition {n + 1}; falls to zero where {model.condition_texts[n]}"
         added.append((CONDITION.format(n + 1), ContinuousLocal(model.condition_units[n], text)))
     for name, meaning in declared:

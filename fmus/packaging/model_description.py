@@ -28,7 +28,6 @@ from .fmi_variables import (
     event_indicator_indices,
     has_step_events,
     interpolated_inputs,
-    offers_model_exchange,
 )
 
 STEPPING_CAPABILITIES = {
@@ -78,8 +77,7 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
         declared = [pair for pair in all_variables(model) if pair[0] != TIME]
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
         step_report = {} if has_step_events(model) else {"completedIntegratorStepNotNeeded": "true"}
-        if offers_model_exchange(model):
-            SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
+        SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
     inputs = [name for name, meaning in declared if meaning.causality == "input"]
     stepping = (
         STEPPING_CAPABILITIES

@@ -19,7 +19,6 @@ from .fmi_variables import (
     derivative_indices,
     event_indicator_indices,
     has_step_events,
-    offers_model_exchange,
 )
 
 TYPE_ELEMENTS = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
@@ -56,8 +55,6 @@ def describe(
     declared = all_variables(model)
     step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(model) else "false"}
     for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
-        if interface == "ModelExchange" and not offers_model_exchange(model):
-            continue
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
     shared.add_units(root, declared)
     _add_types(root, declared)

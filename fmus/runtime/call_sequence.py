@@ -6,6 +6,7 @@ texts).
 
 from math import fabs, inf, isfinite, nan
 
+from . import planar_contact
 from .codes import (
     BAD_START,
     BAD_STEP,
@@ -23,6 +24,7 @@ from .codes import (
     RUNNING,
 )
 from .integrator import STEP_END_TOLERANCE
+from .vectors import planar_indices
 
 # ---- values
 
@@ -179,6 +181,9 @@ def update_outputs(run, model):
 def set_outputs(run, model):
     """Compute the outputs at the current time."""
     solver = run.solver
+    for i in planar_indices:
+        if run.interface == MODEL_EXCHANGE:
+            solver.modes[i] = planar_contact.trial_mode(model, solver.t, solver.y, solver.modes, i)
     run.outputs_current = model.compute_outputs(solver.t, solver.y, solver.modes)
 
 

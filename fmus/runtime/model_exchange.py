@@ -14,7 +14,7 @@ solvers report a zero at the current time as another event.
 
 from math import fabs, inf, nan
 
-from . import call_sequence, conditions, contact_lcp, event_location, stick_slip
+from . import call_sequence, conditions, contact_lcp, event_location, planar_contact, stick_slip
 from .codes import DIVERGED, EPSILON, EVENT, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
 from .conditions import SHORTEST_DWELL
 from .run_state import RunState
@@ -25,8 +25,10 @@ from .vectors import (
     any_of,
     contact_indices,
     contact_vector,
+    is_planar,
     magnitude,
     min_of,
+    planar_indices,
     slip_index,
     state_indices,
     state_vector,
@@ -104,6 +106,9 @@ def begin(run, model):
 def prepare(run, model):
     """Apply pending changes before the model is evaluated.  Returns a status."""
     if run.phase >= RUNNING or run.has_failed:
+        for i in planar_indices:
+            solver = run.solver
+            solver.modes[i] = planar_contact.trial_mode(model, solver.t, solver.y, solver.modes, i)
         return call_sequence.prepare_to_step(run, model)
     if run.outputs_current:
         return OK
@@ -169,6 +174,8 @@ def update_rates(run, model):
         if model.has_other_laws and not solver.step.is_hybrid:
             modes = STUCK * modes
         f = model.rates(solver.t, y, modes)
+        for i in planar_indices:
+            planar_contact.note_trial(model, solver.t, y, i)
         for i in state_indices:
             exchange.rates[i] = f[i]
     if model.has_driver:
@@ -201,6 +208,10 @@ def update_indicators(run, model):
                     if not (force[i] == 0.0 and limit[i] == 0.0):  # without friction, a reversal is no event
                         # after an event the slip is zero but for rounding errors, of either sign
                         to_rest[i] = solver.modes[i] * slips[i] + INDICATOR_OFFSET * sizes[i] + TINY
+                        if is_planar[i]:
+                            to_rest[i] = planar_contact.progress(model, solver.t, solver.y, i)
+                            to_rest[i] += INDICATOR_OFFSET * sizes[i] + TINY
+                            to_break_away[i] = planar_contact.growth_left(model, solver.t, solver.y, i)
                 else:
                     slack = ROUNDOFF_MARGIN * terms[i]
                     to_break_away[i] = limit[i] + slack + INDICATOR_OFFSET * limit[i] + TINY - fabs(force[i])
@@ -300,6 +311,9 @@ def complete_step(run, model):
         return status
     if not sum_of(magnitude(run.solver.y)) < OVERFLOW_LIMIT:
         return DIVERGED
+    for i in planar_indices:
+        solver = run.solver
+        planar_contact.complete_step(model, solver.t, solver.y, solver.modes, i)
     return call_sequence.update_outputs(run, model)
 
 
@@ -327,11 +341,18 @@ def update_modes(run, model):
     step = solver.step
     if model.is_coupled:
         y = contact_lcp.follow_inputs(model, solver.t, solver.y, solver.modes, exchange.slip_errors)
+        for i in planar_indices:
+            if solver.modes[i] != STUCK:
+                y = planar_contact.stop_passing(model, step, solver.t, y, solver.modes, i)
+                solver.modes[i] = 1
         y, modes, step.event_location.has_consistent_modes = contact_lcp.resolve_at_start(
             model, step, solver.t, y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes
+        for i in planar_indices:
+            needs_restart = needs_restart or planar_contact.growth_left(model, solver.t, y, i) < 0.0
+            solver.modes[i] = planar_contact.begin_phase(model, step, solver.t, y, modes, i)
     else:
         for i in contact_indices:
             last_mode = solver.modes[i]

@@ -16,9 +16,18 @@ A body whose load exceeds the friction leaves along its load from where its slip
 from math import inf, sqrt
 
 from . import contact_lcp
-from .codes import EPSILON, ROUNDOFF_MARGIN, STUCK
+from .codes import BACKWARD, EPSILON, FORWARD, ROUNDOFF_MARGIN, STUCK
 from .contact_lcp import CoupledFriction
-from .vectors import ContactIndex, ContactVector, StateVector, elementwise_max, error_size, select_kinematic
+from .vectors import (
+    ContactIndex,
+    ContactVector,
+    StateVector,
+    contact_indices,
+    contact_vector,
+    elementwise_max,
+    error_size,
+    select_kinematic,
+)
 
 # Of the time in which the present rate would remove the slip, or has built it up
 APPROACH_SHARE, GROWTH_SHARE = 0.75, 3.0
@@ -28,6 +37,12 @@ ERROR_SHARE = 1e-3  # of the slip, by which errors may change it in a step
 SMALLEST_TOLERANCE = 1e-13  # lower ones are rounding errors
 RESOLVED = 100.0  # shortest steps in which a slip vanishes that a method can resolve
 CONSTANT_SHARE = 0.01  # of the excess of friction over load, by which the load may change up to the rest
+# Model exchange
+BEGINNING = 2  # mode of a slip that begins
+GROWTH = 10.0  # of the slip since the last event: the solver restarts
+BEGINNING_SHARE = 1e-3  # of the nominal slip: up to this size the slip has the direction of its load
+FOLLOWED_SHARE = 0.1  # of the slip at the last evaluation of rates; a smaller one at an event has passed zero in a step
+REST_SHARE = 1e-10  # of the largest slip since the last event; a smaller one that has passed zero rests
 TINY = 1e-300  # avoids a division by zero
 TIME_RESOLUTION = 64.0 * EPSILON  # share of the time since the start; shorter steps stall
 
@@ -36,6 +51,17 @@ class PlanarFriction(CoupledFriction):
     """Oscillator with contacts in a plane."""
 
     run_tolerance: float  # while a step has a finer one; else 0.0
+    # model exchange: direction of the slip at the last completed step or event, and its sizes since an event
+    last_x: ContactVector
+    last_y: ContactVector
+    smallest: ContactVector
+    largest: ContactVector
+    trial: ContactVector  # its size at the last evaluation of rates
+
+    def __init__(self):
+        super().__init__()
+        self.run_tolerance = 0.0
+        self.last_x = self.last_y = self.smallest = self.largest = self.trial = 0.0
 
     def planar_motion(
         self, t: float, y: StateVector, modes: ContactVector
@@ -43,19 +69,21 @@ class PlanarFriction(CoupledFriction):
         """Return both components of the slips, those of their rates without friction, and the rate by friction."""
 
 
-def slip_direction(slip, other_slip, load, other_load):
-    """Return one component of the direction of the slip; where nothing slips, of the load."""
+def slip_direction(slip, other_slip, load, other_load, mode):
+    """Return one component of the direction of the friction: that of the slip, and where nothing slips, of the load."""
     size = sqrt(slip * slip + other_slip * other_slip)
-    if size > 0.0:
-        return slip / size
+    if size > 0.0 and mode * mode == 1:
+        return mode * slip / size
     size = sqrt(load * load + other_load * other_load)
     return load / size if size > 0.0 else 0.0
 
 
-def slip_turn(slip, other_slip, change, other_change):
-    """Return the change of one component of the direction of the slip; at rest the direction is that of the load."""
+def slip_turn(slip, other_slip, change, other_change, mode):
+    """Return the change of one component of the direction of the friction by the slip."""
     size = sqrt(slip * slip + other_slip * other_slip)
-    return other_slip / size * (other_slip / size * change - slip / size * other_change) / size if size > 0.0 else 0.0
+    if size > 0.0 and mode * mode == 1:
+        return mode * other_slip / size * (other_slip / size * change - slip / size * other_change) / size
+    return 0.0
 
 
 def slips_freely(model, step, modes: ContactVector, i: ContactIndex):
@@ -165,3 +193,89 @@ def time_to_rest(model, step, i: ContactIndex):
     )
     is_constant = change <= CONSTANT_SHARE * (friction[i] - load)
     return duration if is_constant and step.t0 + duration < step.t_end else inf
+
+
+# ---- model exchange
+#
+# Between events the solver of the importer decides, and the motion must be smooth for it.  The indicator `progress`
+# falls to zero where the slip passes zero; beyond, at trial points, friction keeps its direction: mode BACKWARD.  A slip
+# that begins has the direction of its load up to a small size: mode BEGINNING.  Friction turns a slip the faster, the
+# smaller it is, and solvers keep a Jacobian for many steps: they restart where the slip has grown by GROWTH.
+
+
+def progress(model, t, y: StateVector, i: ContactIndex):
+    """Return the slip along its direction at the last completed step."""
+    x, other = slip_components(model, t, y, i)
+    return x * model.last_x[i] + other * model.last_y[i]
+
+
+def growth_left(model, t, y: StateVector, i: ContactIndex):
+    """Return the share by which the slip may grow until the solver of the importer must restart."""
+    x, other = slip_components(model, t, y, i)
+    return 1.0 - sqrt(x * x + other * other) / (GROWTH * model.smallest[i] + TINY)
+
+
+def slip_components(model, t, y: StateVector, i: ContactIndex):
+    """Return both components of a slip."""
+    modes = contact_vector()
+    for j in contact_indices:
+        modes[j] = FORWARD  # the slips do not depend on them
+    x, other, _load_x, _load_y, _friction = model.planar_motion(t, y, modes)
+    return x[i], other[i]
+
+
+def trial_mode(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+    """Return the mode at a point that the solver of the importer tries."""
+    if modes[i] == STUCK or modes[i] == BEGINNING:
+        return modes[i]
+    return BACKWARD if progress(model, t, y, i) < 0.0 else FORWARD
+
+
+def note_trial(model, t, y: StateVector, i: ContactIndex):
+    """Note the size of the slip where rates are evaluated."""
+    x, other = slip_components(model, t, y, i)
+    model.trial[i] = sqrt(x * x + other * other)
+
+
+def complete_step(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+    """Note direction and size of the slip at a completed step, unless the slip has passed zero."""
+    x, other = slip_components(model, t, y, i)
+    size = sqrt(x * x + other * other)
+    if (modes[i] == FORWARD or modes[i] == BACKWARD) and progress(model, t, y, i) > 0.0:
+        model.last_x[i], model.last_y[i] = x / size, other / size
+        model.largest[i] = size if size > model.largest[i] else model.largest[i]
+        model.smallest[i] = size if size < model.smallest[i] else model.smallest[i]
+
+
+def stop_passing(model, step, t, y: StateVector, modes: ContactVector, i: ContactIndex) -> StateVector:
+    """Return the states at an event, without a slip that has passed zero but for errors of the importer's solver.
+
+    Else the slip has turned by a right angle, in steps that follow it.
+    """
+    if modes[i] == STUCK or progress(model, t, y, i) > 0.0:
+        return y
+    slips = model.slip_velocities(t, y)
+    floors = contact_lcp.slip_floors(model, step, t, y)
+    least = model.largest[i] + floors[i]
+    is_followed = slips[i] > step.tolerance * least or (
+        slips[i] > FOLLOWED_SHARE * model.trial[i] and slips[i] > REST_SHARE * least
+    )
+    if is_followed:
+        return y
+    held_modes = contact_vector()
+    for j in contact_indices:
+        held_modes[j] = FORWARD
+    held_modes[i] = STUCK
+    return contact_lcp.stop_slips(model, t, y, held_modes)
+
+
+def begin_phase(model, step, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+    """Note direction and size of the slip after an event.  Returns the mode of the contact."""
+    x, other, load_x, load_y, _friction = model.planar_motion(t, y, modes)
+    floors = contact_lcp.slip_floors(model, step, t, y)
+    size, first = sqrt(x[i] * x[i] + other[i] * other[i]), BEGINNING_SHARE * floors[i]
+    model.last_x[i] = slip_direction(x[i], other[i], load_x[i], load_y[i], modes[i])
+    model.last_y[i] = slip_direction(other[i], x[i], load_y[i], load_x[i], modes[i])
+    model.largest[i] = model.trial[i] = size
+    model.smallest[i] = size if size > 0.0 else first / GROWTH
+    return BEGINNING if modes[i] != STUCK and size == 0.0 else modes[i]

@@ -59,7 +59,10 @@ def force_unknown(context: CodegenContext, contacts: Sequence[Contact]) -> Conta
     stuck_values = {
         c: analysis.load[c] if c in analysis.load else substitute(analysis.slip_rate[c], no_force) for c in contacts
     }
-    return ContactUnknown({c: c for c in contacts}, {c: Term("*", c.mode, c.slide) for c in contacts}, stuck_values)
+    sliding_values = {
+        c: c.slide if isinstance(c, PlanarContact) else Term("*", c.mode, c.slide) for c in contacts
+    }  # in a plane the size
+    return ContactUnknown({c: c for c in contacts}, sliding_values, stuck_values)
 
 
 def derivative_unknown(

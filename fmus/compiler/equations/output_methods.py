@@ -26,7 +26,9 @@ def observe_method(context: CodegenContext) -> str:
     """Return the source of the output method."""
     analysis, printer = context.analysis, context.printer()
     for mode in analysis.modes:
-        printer.emit(f"self.{mode.name} = {printer.text(mode)}")
+        text = printer.text(mode)
+        is_planar = any(mode is c.mode for c in analysis.planar_contacts)  # trial points have modes of their own
+        printer.emit(f"self.{mode.name} = {f'0 if {text} == 0 else 1' if is_planar else text}")
     if any(len(c.laws) > 1 for c in analysis.contacts):
         with printer.block("if self.friction != HYBRID:"):  # as InternalStep.force_modes
             printer.emit(" = ".join([*(c.mode.name for c in analysis.contacts if len(c.laws) > 1), "0"]))

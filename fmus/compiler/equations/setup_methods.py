@@ -44,8 +44,6 @@ def init_method(context: CodegenContext) -> list[str]:
         is_prescribed = is_among(e, context.analysis.prescribed_inputs)
         lines.append(f"self.{e.name}_polynomial = {'PrescribedMotion' if is_prescribed else 'InputPolynomial'}()")
         lines.append(f"self.t_base = self.{rate.name} = 0.0")
-    if context.analysis.planar_contacts:
-        lines.append("self.run_tolerance = 0.0")
     if context.analysis.prescribed_inputs:
         lines.append("self.inconsistent_input = 0")
     if context.constants:

@@ -19,7 +19,7 @@ from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes, replace_fields
 from .feature_selection import EXACT, HYBRID, FeatureSelection
 from .layout import ModelLayout
-from .module_lowering import FileLowerer
+from .module_lowering import PLANAR_MODULE, FileLowerer
 from .vector_symbols import SourceSymbols
 
 FMUS_FOLDER = Path(__file__).resolve().parents[2]
@@ -96,7 +96,7 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> LoweredFiles:
     file = f"{source.name}.py"
     modules = {label: "linear_closed_form" if label == EXACT else label for label in spec.excluded}
     excluded = {f"runtime/{module}.py" for module in modules.values()}
-    excluded |= set() if spec.planar else {"runtime/planar_contact.py"}
+    excluded |= set() if spec.planar else {f"runtime/{PLANAR_MODULE}.py"}
     texts = {path: text for path, text in runtime_sources().items() if path not in excluded} | {
         file: source.generated_source
     }

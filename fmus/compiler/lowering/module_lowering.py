@@ -10,6 +10,7 @@ from .scalarize import LOOP_RANGES, METHOD_LOOP, Scalarizer
 from .vector_symbols import SourceSymbols, annotated_kind, annotated_results, is_marked, item_label
 
 SOLVER_IMPORTS = ("fabs", "nan")  # names of math in the statements of elimination.py
+PLANAR_MODULE = "planar_contact"  # of models with contacts in a plane only
 
 
 class FileLowerer:
@@ -114,7 +115,10 @@ class FileLowerer:
                 return [ast.ImportFrom(None, names, 1)] if names else []
             case ast.ImportFrom() if is_build_time_import(node):
                 return []
-            case ast.Import() | ast.ImportFrom():
+            case ast.ImportFrom(names=aliases):
+                aliases = [alias for alias in aliases if self.spec.planar or alias.name != PLANAR_MODULE]
+                return [replace_fields(node, names=aliases)] if aliases else []
+            case ast.Import():
                 return [node]
         return self.scalarizer.lower_statement(self.drop_excluded_items(node))
 
