@@ -113,7 +113,7 @@ def exchange_errors(
 ) -> tuple[float, float]:
     """Return errors of the time of rest and of the position there in model exchange by CVode, in terms of rtol.
 
-    A load that is nearly as large as the friction takes long to stop the body; the time is weighted with their distance.
+    A load that is nearly as large as the friction takes long to stop the body: its time counts that much less.
     """
     time, x, y = rest(m, F, f, speed, phi)
     values = puck_values(m, f, speed, phi + turn) | {"F_x": F * cos(turn), "F_y": F * sin(turn)}
@@ -136,7 +136,7 @@ def exchange(fmu: str | Path, values: dict[str, float], stop: float, rtol: float
         input=inputs,
         stop_time=stop,
         relative_tolerance=rtol,
-        output_interval=stop / 100,
+        output_interval=stop / 1000,  # CVode may take 500 steps in each
         output=["x", "y", "v_x", "v_y", "mode", "events.t_last", "events.count"],
     )
     return rows

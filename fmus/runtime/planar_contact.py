@@ -197,10 +197,10 @@ def time_to_rest(model, step, i: ContactIndex):
 
 # ---- model exchange
 #
-# Between events the solver of the importer decides, and the motion must be smooth for it.  The indicator `progress`
-# falls to zero where the slip passes zero; beyond, at trial points, friction keeps its direction: mode BACKWARD.  A slip
-# that begins has the direction of its load up to a small size: mode BEGINNING.  Friction turns a slip the faster, the
-# smaller it is, and solvers keep a Jacobian for many steps: they restart where the slip has grown by GROWTH.
+# The motion must be smooth between events.  The indicator `progress` falls to zero where the slip passes zero; at trial
+# points beyond, friction keeps its direction: mode BACKWARD.  A slip that begins has the direction of its load while it
+# is small: mode BEGINNING.  Friction turns a small slip fast, and implicit solvers keep a Jacobian for many steps: that
+# of a much smaller slip hides errors from them.  So they restart where the slip has grown by GROWTH.
 
 
 def progress(model, t, y: StateVector, i: ContactIndex):

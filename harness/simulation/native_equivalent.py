@@ -58,15 +58,10 @@ def native_with_derivatives(fmu: Path) -> Path:
     Raises
     ------
     HarnessError
-        If it offers no model exchange, or has no derivatives for it.
+        If it has no derivatives for model exchange.
     """
     check_built(fmu, SceneError)
     fmu = native_equivalent(fmu)
-    if not is_python_fmu(unpack_once(fmu)) and read_description(fmu, lenient=True).modelExchange is None:
-        raise HarnessError(
-            f"{fmu.name} offers co-simulation only, as models with a PlanarContact do; derivatives of a motion by "
-            "parameters need model exchange"
-        )
     if not has_derivatives(unpack_once(fmu)):
         raise HarnessError(
             f"{fmu.name} has no directional derivatives for model exchange; native FMUs of this project have them: "

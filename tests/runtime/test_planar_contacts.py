@@ -256,23 +256,6 @@ def test_unsupported_contact_is_refused_by_name(tmp_path, parts, message):
     assert re.match(rf"Error: puck.py, line \d+: {message}", done.stderr), done.stderr
 
 
-@pytest.mark.parametrize(
-    "words", [NATIVE, pytest.param(("--fmi", "3", "--platform", "linux64"), marks=pytest.mark.slow)]
-)
-def test_model_exchange_is_not_offered(build, words):
-    require_compiler()
-    fmu = build("puck", *words)
-    description = read_model_description(fmu)
-    assert description.modelExchange is None
-    assert description.coSimulation is not None
-    assert not description.eventIndicators
-    assert not [v.name for v in description.modelVariables if "event indicator" in v.description]
-    with pytest.raises(harness.HarnessError, match="offers co-simulation; model exchange is not among them"):
-        harness.simulate(fmu, interface="ModelExchange")
-    with pytest.raises(harness.HarnessError, match="co-simulation only, as models with a PlanarContact do"):
-        harness.sensitivity(fmu, ["f"])
-
-
 def test_directional_derivatives_are_those_of_the_formulas(puck):
     description = read_model_description(puck)
     references = {v.name: v.valueReference for v in description.modelVariables}

@@ -1,0 +1,75 @@
+"""Contacts in a plane in model exchange: solvers of an importer find the rest and the break-away as the closed form."""
+
+from math import cos, hypot, pi, radians, sin
+
+import pytest
+from build_cache import build_once, build_user_model
+from native_fmus import require_compiler
+from variants import slow_after
+
+from benchmarks.campaigns import planar_contacts
+from benchmarks.references.plane import rest
+
+KINDS = {"FMI 3.0": ("--fmi", "3"), "FMI 2.0": ("--native",)}
+PLATFORM = ("--platform", "linux64")
+# force, direction of the motion from that of the force; friction 2 N, mass 1 kg, speed 1 m/s
+SCENES = [(1.0, pi / 2), (1.9, pi - 1e-6), (0.1, 2.0), (1.999, 1.0), (1e-3, 1.0)]
+
+
+@pytest.fixture(scope="module", params=slow_after(1, KINDS))
+def puck(request):
+    require_compiler()
+    return build_once(f"puck-{request.param}", "puck", *KINDS[request.param], *PLATFORM) / "puck.fmu"
+
+
+@pytest.mark.parametrize(("F", "phi"), slow_after(2, SCENES))
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_cvode_brings_a_body_to_rest_as_the_closed_form_says(puck, F, phi, rtol):
+    assert max(planar_contacts.exchange_errors(puck, 1.0, F, 2.0, 1.0, phi, rtol=rtol)) < 100.0
+
+
+@pytest.mark.slow
+def test_cvode_brings_random_motions_to_rest_as_the_closed_form_says(puck):
+    for scene in planar_contacts.random_scenes(100):
+        for rtol in (1e-4, 1e-8):
+            assert max(planar_contacts.exchange_errors(puck, *scene, rtol=rtol)) < 100.0, scene
+
+
+@pytest.mark.parametrize(("F", "phi"), slow_after(1, SCENES[:3]))
+def test_an_explicit_solver_brings_a_body_to_rest_as_the_closed_form_says(puck, worker, F, phi):
+    if "FMI 2.0" in str(puck):
+        pytest.skip("the helper of the tests steps FMUs of FMI 3.0")
+    fmu = worker.exchange(puck)
+    fmu.begin(planar_contacts.puck_values(1.0, 2.0, 1.0, phi) | {"F_x": F})
+    fmu.update_discrete_states()
+    fmu.enter_continuous_time()
+    time, x, y = rest(1.0, F, 2.0, 1.0, phi)
+    rows, _ = fmu.solve([0.0, 1.3 * time], ("x", "y", "v_x", "v_y", "mode", "events.t_last"), "DOP853", 1e-8, {})
+    (x_end, y_end, *end) = rows[-1]
+    assert end == [0.0, 0.0, 0, pytest.approx(time, rel=1e-6)]
+    assert (x_end, y_end) == pytest.approx((x, y), abs=1e-6 * time)
+    fmu.free()
+
+
+@pytest.mark.parametrize("degrees", [30, 200])
+def test_a_body_holds_up_to_a_circle_and_leaves_along_its_load(puck, degrees):
+    angle = radians(degrees)
+    for force in (2.0 - 1e-7, 2.0 + 1e-7):
+        values = planar_contacts.puck_values(1.0, 2.0, 0.0, 0.0) | {
+            "F_x": force * cos(angle),
+            "F_y": force * sin(angle),
+        }
+        end = planar_contacts.exchange(puck, values, 1.0, 1e-8)[-1]
+        assert hypot(end["x"], end["y"]) == pytest.approx(max(0.0, 0.5 * (force - 2.0)), abs=1e-10)
+        assert (end["mode"], end["events.count"]) == ((1, 0) if force > 2.0 else (0, 0))
+        assert end["x"] * cos(angle) + end["y"] * sin(angle) == pytest.approx(hypot(end["x"], end["y"]), rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+def test_cvode_follows_springs_circles_and_jumps_as_co_simulation_does(rtol, tmp_path):
+    require_compiler()
+    (tmp_path / "driven.py").write_text(planar_contacts.MODEL)
+    fmu = next(build_user_model(tmp_path / "driven.py", "--native", *PLATFORM).rglob("driven.fmu"))
+    for seed in range(20):
+        assert planar_contacts.compare_exchange(fmu, planar_contacts.random_driven(seed), rtol) == "", seed
