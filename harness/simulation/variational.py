@@ -14,7 +14,7 @@ P. C. Mueller, Calculation of Lyapunov exponents for dynamic systems with discon
 Circuits and Systems I 47 (2000) 204-220.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import (
     byref,
     c_double,
@@ -164,12 +164,22 @@ class VariationalRun:
         `tolerance` is that of the integration.
     parameters : sequence of str
         Parameters, constant inputs, driven inputs (the factor of the signal), or states whose start values can be set.
+    max_steps : int
+        Number of steps after which a run fails.
     """
 
-    def __init__(self, instance: FmuInstance, folder: Path, spec: RunSpec, parameters: Sequence[str]) -> None:
+    def __init__(
+        self,
+        instance: FmuInstance,
+        folder: Path,
+        spec: RunSpec,
+        parameters: Sequence[str],
+        max_steps: int = MAX_STEPS,
+    ) -> None:
         assert spec.start is not None
         assert spec.stop is not None
         self.instance, self.fmu, self.spec, self.parameters = instance, instance.fmu, spec, tuple(parameters)
+        self.max_steps = max_steps
         self.start, self.stop, self.library = spec.start, spec.stop, load_library()
         self.tolerance = NEAR * (self.stop - self.start)
         description, variables = instance.description, instance.variables
@@ -179,7 +189,8 @@ class VariationalRun:
         self.inputs = [variables[name] for name in spec.inputs if name != TIME]
         self.columns = {name: np.asarray(column, dtype=float) for name, column in spec.inputs.items()}
         self.settings = {variables[name]: value for name, value in spec.values.items()}
-        self.knowns = [self.select_known(variables[name], states) for name in parameters]
+        self.states = states
+        self.knowns = [self.select_known(variables[name]) for name in parameters]
         calculated = {unknown.variable.name for unknown in description.initialUnknowns}
         self.calculated = [i for i, state in enumerate(states) if state.name in calculated]
         self.modes = tuple(read_model_data(spec.fmu).contacts.values())
@@ -187,11 +198,11 @@ class VariationalRun:
         self.n, self.m, self.q = len(states), len(parameters), int(description.numberOfEventIndicators or 0)
         self.allocate({"states": states, "rates": rates, "inputs": self.inputs})
 
-    def select_known(self, variable: Any, states: Sequence[Any]) -> Known:
+    def select_known(self, variable: Any) -> Known:
         """Return what is needed of a parameter."""
-        if variable in states:
+        if variable in self.states:
             value = float(self.settings.get(variable, variable.start))
-            return Known(variable, np.array([value]), 0, states.index(variable), -1)
+            return Known(variable, np.array([value]), 0, self.states.index(variable), -1)
         if variable in self.inputs:
             return Known(variable, np.ones(1), 0, -1, self.inputs.index(variable))
         return Known(variable, np.array([float(self.settings.get(variable, variable.start or 0.0))]), 0, -1, -1)
@@ -222,10 +233,7 @@ class VariationalRun:
         groups["influenced"] = [*groups["rates"], *(output for output in outputs if output.type in REAL_TYPES)]
         self.references = {name: instance.make_references(group) for name, group in groups.items()}
         self.structs = (ParameterStruct * max(m, 1))()
-        for struct, known in zip(self.structs, self.knowns, strict=False):
-            struct.reference, struct.element, struct.input = known.variable.valueReference, known.element, known.input
-            struct.width, struct.value = 0 if known.state >= 0 else len(known.array), known.value
-            struct.all, struct.kind = known.array.ctypes.data, known.kind
+        self.change_values({})
         modes = [instance.variables[name] for name in self.modes]
         self.mode_structs = (ElementStruct * max(len(modes), 1))()
         for mode, variable in zip(self.mode_structs, modes, strict=False):
@@ -254,6 +262,18 @@ class VariationalRun:
         run.capacity, run.capacity_notes = len(self.arrays["event_values"]), len(self.arrays["note_values"])
         self.y = self.arrays["z"][:n]
         self.slopes = self.arrays["z"][n : n * (1 + m)].reshape(m, n)  # of the states, by parameter
+
+    def change_values(self, values: Mapping[str, float]) -> None:
+        """Give variables other values in the following runs, by name."""
+        self.settings |= {self.instance.variables[name]: value for name, value in values.items()}
+        sides = [known.side for known in self.knowns]
+        self.knowns = [self.select_known(known.variable) for known in self.knowns]
+        for known, side in zip(self.knowns, sides, strict=True):
+            known.side = side
+        for struct, known in zip(self.structs, self.knowns, strict=False):
+            struct.reference, struct.element, struct.input = known.variable.valueReference, known.element, known.input
+            struct.width, struct.value = 0 if known.state >= 0 else len(known.array), known.value
+            struct.all, struct.kind = known.array.ctypes.data, known.kind
 
     def allocate_logs(self) -> None:
         """Allocate the logs of events and of times without derivatives, and the table of inputs."""
@@ -376,7 +396,8 @@ class VariationalRun:
         base = self.start_indicators()
         assert base is not None
         for known in self.knowns if self.q else ():
-            known.side = self.find_side(known) if known.is_set else None
+            if known.is_set and known.side is None:  # of runs with other values, only the first one looks
+                known.side = self.find_side(known)
         for struct, known in zip(self.structs, self.knowns, strict=False):
             struct.side = NO_SIDE if known.side is None else known.side
             self.save_starts(known, struct)
@@ -432,10 +453,10 @@ class VariationalRun:
         while status != REACHED:
             check_interrupt()
             report(min(1.0, (run.t - self.start) / (self.stop - self.start)))
-            run.max_steps = run.n_steps + STEPS_PER_CHECK
+            run.max_steps = min(run.n_steps + STEPS_PER_CHECK, self.max_steps)
             status = self.library.solve(byref(run), c_double(end))
             self.read_logs()
-            if status != LOG_FULL and not (status == TOO_MANY_STEPS and run.n_steps < MAX_STEPS):
+            if status != LOG_FULL and not (status == TOO_MANY_STEPS and run.n_steps < self.max_steps):
                 self.check(status)
 
     def check(self, status: int) -> None:
@@ -451,7 +472,8 @@ class VariationalRun:
                 STEP_EVENT: f"it has an event {at} that no event indicator locates",
                 TERMINATED: f"it ends the simulation {at}",
                 FAILED: f"its equations, or their derivatives, have no finite values {at}",
-                TOO_MANY_STEPS: f"it needs more than {MAX_STEPS} steps, {at}: choose an earlier stop or a larger rtol",
+                TOO_MANY_STEPS: f"it needs more than {self.max_steps} steps, {at}: "
+                "choose an earlier stop or a larger rtol",
                 EVENT_TERMINATED: f"it returned terminateSimulation from an event {at}",
                 EARLY_EVENT: f"it sets its next event to {run.next_event:.9g} s, {at}",
                 UNSETTLED: f"its discrete states do not settle {at}",

@@ -1,5 +1,6 @@
 """fit: parameters of FMUs from drawn records and what a record does not determine."""
 
+import itertools
 import json
 import re
 from dataclasses import replace
@@ -19,6 +20,7 @@ import harness
 from benchmarks.campaigns.drawn_records import GROUPS, draw_record
 from benchmarks.campaigns.fit_campaign import SOURCES
 from harness import HarnessError, SceneError
+from harness.analyses.fit.fit_problem import FitProblem
 from harness.scenes.run_spec import RunSpec
 from harness.simulation.whole_run import open_simulator
 
@@ -224,6 +226,48 @@ def test_a_sensor_with_offset_and_gain_is_identified():
     fit = harness.fit(native("stickslip"), frame, free, observe="x", values=DRIVEN | {"k": 900.0})
     for name, truth in {"mu_s": 0.8, "offset(x)": 0.02, "gain(x)": 1.1}.items():
         assert holds(fit[name], truth)
+
+
+EXACT = {  # record, and what is free, observed and fixed
+    "slips": ("stickslip", {}, ["mu_s", "k"], {"mu_d": 0.5, "v_driver": 0.04}, {}),
+    "sensor": ("stickslip", {}, ["mu_s", "offset(x)", "gain(x)"], {"mu_d": 0.5, "k": 900.0, "v_driver": 0.04}, {}),
+    "robust": ("stickslip", {}, ["mu_s", "mu_d", "k"], {"v_driver": 0.04}, {"robust": True}),
+    "start": ("pendulum", {"theta0": 0.9}, ["mu", "J_G", "theta0"], {}, {}),
+    "belt": ("belt", {}, ["k", "f_s", "f_d"], {}, {}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXACT)
+def test_exact_derivatives_find_what_differences_find_with_fewer_runs(monkeypatch, name):
+    """Where every second derivative does not exist, differences replace it."""
+    model, values, free, fixed, options = EXACT[name]
+    output = "theta" if model == "pendulum" else "x"
+    if model == "stickslip":
+        record = pull()
+    else:
+        t = np.linspace(0.0, 6.0, 201)
+        y = harness.simulate(native(model), values, times=t, outputs=[output])[output]
+        record = {"t": t, output: y + 0.01 * np.ptp(y) * np.random.default_rng(1).normal(size=len(t))}
+    exact_jacobian, count = FitProblem.exact_jacobian, itertools.count()
+
+    def fit():
+        return harness.fit(native(model), record, free, observe=output, values=fixed, **options)
+
+    def every_second(problem, *arguments):
+        return None if next(count) % 2 else exact_jacobian(problem, *arguments)
+
+    exact = fit()
+    monkeypatch.setattr(FitProblem, "exact_jacobian", every_second)
+    half = fit()
+    monkeypatch.setattr(FitProblem, "exact_jacobian", lambda *arguments: None)
+    by_differences = fit()
+    assert exact.n_runs < by_differences.n_runs
+    for other in (half, by_differences):
+        for one, two in zip(exact.estimates, other.estimates, strict=True):
+            ends = [one.value - two.value, one.low - two.low, one.high - two.high]
+            assert np.abs(ends).max() <= 1e-3 * (two.high - two.low)
+    assert next(count) > 2  # derivatives were wanted
 
 
 @pytest.mark.slow

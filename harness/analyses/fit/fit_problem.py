@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...scenes.run_spec import RunSpec
+from ...simulation.derivative_runs import DerivativeRuns
 from .measured_record import MeasuredRecord
 from .unknowns import DELAY, GAIN, OFFSET, FeasibleRegion, Unknown
 
@@ -35,6 +37,8 @@ class FitProblem:
         Values of parameters that are not fitted.
     robust : bool
         Whether large residuals count linearly (Huber) instead of by their squares.
+    derivatives : DerivativeRuns, optional
+        Runs whose derivatives replace central differences, where these exist.
     """
 
     def __init__(
@@ -44,7 +48,9 @@ class FitProblem:
         unknowns: Sequence[Unknown],
         fixed: Mapping[str, float],
         robust: bool = False,
+        derivatives: DerivativeRuns | None = None,
     ) -> None:
+        self.derivatives = derivatives
         self.records, self.outputs = tuple(records), list(outputs)
         self.unknowns, self.fixed, self.robust = tuple(unknowns), dict(fixed), robust
         self.sensors = [(i, unknown) for i, unknown in enumerate(self.unknowns) if unknown.column is not None]
@@ -150,7 +156,12 @@ class FitProblem:
     def jacobian(
         self, z: np.ndarray, e: np.ndarray, selection: Selection, free: np.ndarray, central: bool
     ) -> np.ndarray:
-        """Return the derivatives (n, free) of the residuals e (n,), one-sided if the FMU refuses the other side."""
+        """Return the derivatives (n, free) of the residuals e (n,), one-sided if the FMU refuses the other side.
+
+        Where central differences are needed, they are exact if the FMU has derivatives there.
+        """
+        if central and (exact := self.exact_jacobian(z, e, selection)) is not None:
+            return exact[:, free]
         columns, h = np.zeros((len(e), len(free))), self.steps[central]
         for j, i in enumerate(free):
             d = h * np.eye(len(z))[i]
@@ -161,12 +172,53 @@ class FitProblem:
                 columns[:, j] = (ends[0][0] - ends[1][0]) / (h * (ends[0][1] - ends[1][1]))
         return columns
 
+    def exact_jacobian(self, z: np.ndarray, e: np.ndarray, selection: Selection) -> np.ndarray | None:
+        """Return the derivatives (n, k) of the residuals e (n,) by runs with derivatives; None if there are none."""
+        if self.derivatives is None or any(unknown.variable == DELAY for _, unknown in self.sensors):
+            return None
+        blocks = []
+        for i, (record, index) in enumerate(zip(self.records, selection, strict=True)):
+            block = self.output_slopes(z, i, record.spec_of(index))
+            if block is None:
+                return None
+            blocks.append((block / record.noise[:, None]).reshape(-1, len(z)))
+        jacobian = np.concatenate(blocks)
+        if self.robust:
+            jacobian *= (HUBER / np.maximum(np.abs(e), HUBER))[:, None]
+        return jacobian
+
+    def output_slopes(self, z: np.ndarray, i: int, spec: RunSpec) -> np.ndarray | None:
+        """Return the derivatives (samples, columns, k) of the sensor signals of record i; None if there are none."""
+        assert self.derivatives is not None
+        values = self.values(z, i)
+        names = [one.variable for one in self.unknowns if one.column is None and one.record in (None, i)]
+        solution = self.derivatives.differentiate(spec, names, values)
+        if solution is None:
+            return None
+        y, by_name = solution
+        slopes, gains = np.zeros((*y.shape, len(z))), self.sensor_values(z, i, GAIN)
+        for j, unknown in enumerate(self.unknowns):
+            scale = unknown.slope(unknown.to_value(float(z[j])))
+            if unknown.record not in (None, i):
+                continue
+            if unknown.column is not None:
+                slopes[:, unknown.column, j] = scale * (y[:, unknown.column] if unknown.variable == GAIN else 1.0)
+                continue
+            slopes[:, :, j] = scale * by_name[:, names.index(unknown.variable)]
+            for column, gain in gains.items():
+                slopes[:, column, j] *= gain
+        return slopes
+
     def choose_steps(self, z: np.ndarray, e: np.ndarray) -> np.ndarray:
-        """Choose the steps of differences by their errors at z (k,); return the central differences (n, k) of e (n,).
+        """Return the derivatives (n, k) of e (n,) at z (k,), by central differences if they are not exact.
+
+        The steps of differences are chosen by their errors.
 
         Steps that are too short or too long add errors, which increase the determinant: a direction that hardly
         changes the residuals looks better determined than it is.
         """
+        if (exact := self.exact_jacobian(z, e, self.all)) is not None:
+            return exact
         best, lowest = self.steps, np.inf
         for steps in ALL_STEPS:
             self.steps = steps

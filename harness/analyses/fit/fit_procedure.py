@@ -7,6 +7,7 @@ import numpy as np
 
 from ...errors import HarnessError, SceneError, option_text
 from ...records.extraction import Samples
+from ...simulation.derivative_runs import DerivativeRuns
 from ...simulation.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
 from .measured_record import MeasuredRecord
@@ -74,6 +75,7 @@ def fit_records(
     robust: bool,
     report: Callable[[float], None],
     averages: bool = True,
+    derivatives: DerivativeRuns | None = None,
 ) -> tuple[FitProblem, RawFit]:
     """Fit the unknowns.
 
@@ -81,6 +83,8 @@ def fit_records(
     ----------
     averages : bool
         Whether long records are fitted as means of neighbouring samples, if these are the signal at their mean times.
+    derivatives : DerivativeRuns, optional
+        Runs with derivatives.
 
     Raises
     ------
@@ -101,7 +105,7 @@ def fit_records(
     warm_start: np.ndarray | None = None
     for binned in (True, False) if averages else (False,):
         records = [MeasuredRecord(simulator, record_data, binned) for record_data in data]
-        problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust)
+        problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust, derivatives)
         raw_fit = search_and_refine(problem, warm_start, any(record_data.sigma for record_data in data), report)
         if is_averaging_negligible(problem, raw_fit):
             break

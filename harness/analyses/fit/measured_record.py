@@ -7,6 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ...records.extraction import Samples
+from ...scenes.run_spec import RunSpec
 from ...simulation.stepping import merge_points
 from ...simulation.whole_run import Run, Simulator
 from ..estimation.estimate import interpolation_residuals, residual_correlation, robust_std
@@ -92,10 +93,11 @@ SHORTEST_INTERVAL = 1e-6  # between communication points, in intervals between s
 
 @dataclass(frozen=True)
 class RecordPart:
-    """The samples `index` of a record: their values y, and the run that returns the outputs there."""
+    """The samples `index` of a record: their values y, and the run that returns the outputs there, as its `spec`."""
 
     index: np.ndarray
     y: np.ndarray
+    spec: RunSpec
     run: Run
 
 
@@ -166,13 +168,18 @@ class MeasuredRecord:
         else:
             used = np.unique(np.append(np.arange(0, len(t), every), len(t) - 1))
             self.driven = {name: CubicSpline(t[used], u[used])(self.fine_t) for name, u in self.inputs.items()}
-        self.run = self.prepare(self.t, self.fine_t, self.driven)
+        self.spec = self.specify(self.t, self.fine_t, self.driven)
+        self.run = self.simulator.prepare(self.spec)
 
-    def prepare(self, times: np.ndarray, knots: np.ndarray, inputs: Mapping[str, np.ndarray]) -> Run:
-        """Prepare runs that return the outputs at `times` in s, with inputs at `knots` (n,) in s, first to last."""
+    def specify(self, times: np.ndarray, knots: np.ndarray, inputs: Mapping[str, np.ndarray]) -> RunSpec:
+        """Specify runs that return the outputs at `times` in s, with inputs at `knots` (n,) in s, first to last."""
         table = {"time": knots, **inputs} if inputs else {}
         start, stop = knots[[0, -1]].tolist()
-        return self.simulator.prepare(replace(self.simulator.spec, inputs=table, start=start, stop=stop, times=times))
+        return replace(self.simulator.spec, inputs=table, start=start, stop=stop, times=times)
+
+    def prepare(self, times: np.ndarray, knots: np.ndarray, inputs: Mapping[str, np.ndarray]) -> Run:
+        """Prepare such runs."""
+        return self.simulator.prepare(self.specify(times, knots, inputs))
 
     def simulate(
         self, values: Mapping[str, float], index: np.ndarray, delays: Mapping[int, float] | None = None
@@ -187,6 +194,10 @@ class MeasuredRecord:
         if delays:
             return self.simulate_delayed(values, index, delays)
         return self.run(values) if len(index) == len(self.t) else self.part(index).run(values)
+
+    def spec_of(self, index: np.ndarray) -> RunSpec:
+        """Return the specification of the run for the samples `index`."""
+        return self.spec if len(index) == len(self.t) else self.part(index).spec
 
     @property
     def noisy_inputs(self) -> dict[str, float]:
@@ -213,8 +224,8 @@ class MeasuredRecord:
             grid = self.rows[index]
             if self.inputs:
                 grid = np.union1d(self.sparse_knots(index), grid)
-            run = self.prepare(self.t[index], self.knots[grid], {name: u[grid] for name, u in self.inputs.items()})
-            self.parts[id(index)] = RecordPart(index, self.y[index], run)
+            spec = self.specify(self.t[index], self.knots[grid], {name: u[grid] for name, u in self.inputs.items()})
+            self.parts[id(index)] = RecordPart(index, self.y[index], spec, self.simulator.prepare(spec))
         return self.parts[id(index)]
 
     def sparse_knots(self, index: np.ndarray) -> np.ndarray:

@@ -229,7 +229,7 @@ class ParameterFit:
     n_independent : float
         Number of residuals that count as independent; fewer than there are, if they are correlated.
     n_searches, n_runs : int
-        Number of searches, and of runs of the FMU.
+        Number of searches, and of runs of the FMU, with derivatives or without.
     seconds : float
         Processor time.
     log : tuple of str

@@ -71,6 +71,10 @@ class Unknown:
         """Return the value at a coordinate."""
         return self.sign * exp(coordinate) if self.sign else coordinate * self.scale
 
+    def slope(self, value: float) -> float:
+        """Return the derivative of a value by its coordinate."""
+        return value if self.sign else self.scale
+
     @property
     def search_range(self) -> tuple[float, float]:
         """Return the range to search in the coordinate."""

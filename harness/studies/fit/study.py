@@ -4,6 +4,7 @@ In a comparison of laws, each FMU frees and fixes those names that it has.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from itertools import chain
 from os.path import basename, exists
@@ -21,6 +22,7 @@ from ...records.columns import ColumnOptions
 from ...records.extraction import Samples
 from ...records.record import Record, load_record
 from ...results.provenance import load_provenance
+from ...simulation.derivative_runs import DerivativeRuns
 from ...simulation.fmu_archive import read_description
 from ...simulation.model_data import read_tables_with
 from ...simulation.native_equivalent import native_equivalent
@@ -240,15 +242,21 @@ def fit_samples(
     units = {name: task.variables[name].unit for name in request.observe}
     slips = irregular_slips(data, [*units.items()])
     unknowns, doubts = make_unknowns(task, data), [*span_remarks(task, data)]
-    with open_simulator(replace(task.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
+    with (
+        open_simulator(replace(task.shared, fmu=native_equivalent(request.run.fmu))) as simulator,
+        closing(DerivativeRuns(simulator.spec)) as derivatives,
+    ):
         try:
-            problem, raw_fit = fit_records(simulator, data, unknowns, task.fixed, request.robust, report, averages)
+            problem, raw_fit = fit_records(
+                simulator, data, unknowns, task.fixed, request.robust, report, averages, derivatives
+            )
         except HarnessError as error:
             remarks = [*doubts, *(one.remark for one in slips)]
             raise HarnessError(". ".join([str(error), *remarks]).removesuffix(".")) from None
         prediction = validate(problem, raw_fit, validation) if validation else None
         notes = [note for samples in (*data, *validation) for note in samples.notes]
-        fit = describe_fit(task.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
+        n_runs = simulator.n_runs + derivatives.n_runs
+        fit = describe_fit(task.name, problem, raw_fit, notes, n_runs, process_time() - start_time)
     curves = read_tables_with(request.run.fmu, [estimate.name for estimate in fit.estimates], request.run.values)
     rough = {(column.record, column.name) for column in fit.columns if column.residual > ROUGH * column.noise}
     slips = tuple(one for one in slips if (one.record, one.column) in rough)  # an input may explain the others
