@@ -8,8 +8,7 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..scenes.run_spec import RunSpec
-from .array_elements import is_own, split_own_arrays
-from .fmu_archive import read_leniently, unpack_once
+from .fmu_archive import is_own, read_leniently, unpack_once
 from .fmu_instance import CALL_FAILURES, FmuInstance
 from .native_equivalent import check_has_events
 from .variational import VariationalRun, has_derivatives, state_variables
@@ -38,7 +37,7 @@ class DerivativeRuns:
         self.folder, self.n_runs, self.is_slow = Path(folder), 0, False
         self.instance: FmuInstance | None = None
         self.prepared: dict[int, tuple[RunSpec, VariationalRun]] = {}
-        description = split_own_arrays(read_leniently(folder))
+        description = read_leniently(folder)
         variables = {variable.name: variable for variable in description.modelVariables}
         outputs = [*(unknown.variable for unknown in description.outputs), *state_variables(description)]
         exist = is_own(description) and description.modelExchange is not None and has_derivatives(self.folder)

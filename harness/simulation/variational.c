@@ -26,19 +26,13 @@ typedef void (*Function)(void);
 
 typedef struct { /* a parameter, or the factor of a driven input, or the start value of a state */
     Reference reference;
-    size_t width, element; /* number of its values and which of them is meant; width 0 if it enters no equation */
+    bool is_start;         /* whether it is the start value of a state, which enters no equation */
     int64_t input;         /* index of the driven input, or -1 */
     double value;          /* 0 if unknown */
-    double *all;           /* the values of its array */
     int64_t kind, side;    /* TUNABLE or FIXED if it is set; see `Known.side` */
     double change;         /* of FIXED ones, of which runs are saved at the start: without it, and with 1/2, 1, -1/2, -1 */
     void *starts[5];
 } Parameter;
-
-typedef struct { /* an integer, which may be one of an array */
-    Reference reference;
-    size_t width, element;
-} Element;
 
 typedef struct {
     Instance instance;
@@ -62,7 +56,7 @@ typedef struct {
     /* events, see variational_events.c */
     Function update, enter_event, enter_continuous, get_states, get_mode, save, restore, release; /* the last may be NULL */
     const Reference *influenced; /* rates and outputs */
-    const Element *modes;
+    const Reference *modes;
     size_t n_influenced, n_modes, n_signals;
     const double *signals;                 /* of inputs: time and values (n_signals, 1 + n_inputs) */
     double duration, tolerance, next_event, row, last_t; /* times in s: next event that the FMU sets, next of `signals` */
@@ -117,20 +111,19 @@ static bool tangent(const Run *run, const Reference *unknowns, size_t count, siz
                     double *values)
 {
     const Parameter *parameter = &run->parameters[i];
-    size_t n = run->n, width = parameter->width, knowns = n + (width > 0);
+    size_t n = run->n, knowns = n + !parameter->is_start;
     Reference *references = (Reference *)(run->work + run->n_inputs);
     double *seed = run->work + run->n_inputs + n + 1;
     if (!count) return true;
     memcpy(references, run->states, n * sizeof *references);
     references[n] = parameter->reference;
     memcpy(seed, s, n * sizeof *seed);
-    for (size_t j = 0; j < width; j++) seed[n + j] = 0.0;
-    if (width) seed[n + parameter->element] = parameter->input < 0 ? 1.0 : input_at(run, (size_t)parameter->input, t);
+    seed[n] = parameter->input < 0 ? 1.0 : input_at(run, (size_t)parameter->input, t);
     if (run->fmi == 2)
         return ((int (*)(Instance, const Reference *, size_t, const Reference *, size_t, const double *, double *))
                     run->derive)(run->instance, unknowns, count, references, knowns, seed, values) <= WARNING;
     return ((int (*)(Instance, const Reference *, size_t, const Reference *, size_t, const double *, size_t, double *,
-                     size_t))run->derive)(run->instance, unknowns, count, references, knowns, seed, n + width, values,
+                     size_t))run->derive)(run->instance, unknowns, count, references, knowns, seed, knowns, values,
                                           count) <= WARNING;
 }
 
@@ -482,30 +475,29 @@ static int advance(Run *run, double target)
     return REACHED;
 }
 
-/* Set a value of parameter i to a sum; `all` are the values of its array. */
-static bool set_parameter(const Run *run, size_t i, double *all, double sum)
+/* Set parameter i. */
+static bool set_parameter(const Run *run, size_t i, double value)
 {
-    const Parameter *parameter = &run->parameters[i];
-    all[parameter->element] = sum;
+    const Reference *reference = &run->parameters[i].reference;
     if (run->fmi == 2)
-        return ((int (*)(Instance, const Reference *, size_t, const double *))run->set)(
-                   run->instance, &parameter->reference, 1, all) <= WARNING;
-    return ((int (*)(Instance, const Reference *, size_t, const double *, size_t))run->set)(
-               run->instance, &parameter->reference, 1, all, parameter->width) <= WARNING;
+        return ((int (*)(Instance, const Reference *, size_t, const double *))run->set)(run->instance, reference, 1,
+                                                                                     &value) <= WARNING;
+    return ((int (*)(Instance, const Reference *, size_t, const double *, size_t))run->set)(run->instance, reference, 1,
+                                                                                         &value, 1) <= WARNING;
 }
 
 /* Indicator k at the present point, with the states moved by e along their change by parameter i, or, for i = m, along
- * the motion, in continuous-time mode; with `all`, the values of its array, parameter i is moved instead, in event mode. */
-static double moved_indicator(Run *run, size_t k, size_t i, double e, const double *rates, double *all)
+ * the motion, in continuous-time mode; without `rates`, parameter i is moved instead, in event mode. */
+static double moved_indicator(Run *run, size_t k, size_t i, double e, const double *rates)
 {
     size_t n = run->n;
     double *y = run->dense;
     bool by_time = i == run->m, ok;
     const double *direction = by_time ? rates : run->z + n * (1 + i);
-    if (all) {
-        double value = all[run->parameters[i].element];
-        ok = set_parameter(run, i, all, value + e) && get_array(run, run->get_indicators, run->g1, run->q);
-        return set_parameter(run, i, all, value) && ok ? run->g1[k] : NAN;
+    if (!rates) {
+        double value = run->parameters[i].value;
+        ok = set_parameter(run, i, value + e) && get_array(run, run->get_indicators, run->g1, run->q);
+        return set_parameter(run, i, value) && ok ? run->g1[k] : NAN;
     }
     for (size_t j = 0; j < n; j++) y[j] = run->z[j] + e * direction[j];
     ok = set_point_with(run, by_time ? run->t + e : run->t, y, by_time ? -1 : run->parameters[i].input, 1.0 + e);
@@ -514,12 +506,12 @@ static double moved_indicator(Run *run, size_t k, size_t i, double e, const doub
 
 /* Derivative of indicator k along such a move: the limit of differences over e, e/2, ... by extrapolation (Ridders).
  * `sides` is 0 for central differences, and 1 or -1 for one-sided ones. */
-static double indicator_slope(Run *run, size_t k, size_t i, double e, int sides, const double *rates, double *all)
+static double indicator_slope(Run *run, size_t k, size_t i, double e, int sides, const double *rates)
 {
-    double table[LEVELS][LEVELS], best = NAN, least = INFINITY, base = moved_indicator(run, k, i, 0.0, rates, all);
+    double table[LEVELS][LEVELS], best = NAN, least = INFINITY, base = moved_indicator(run, k, i, 0.0, rates);
     for (size_t level = 0; level < LEVELS; level++, e *= 0.5) {
-        double up = moved_indicator(run, k, i, sides < 0 ? -e : e, rates, all);
-        double down = sides ? base : moved_indicator(run, k, i, -e, rates, all), factor = 1.0;
+        double up = moved_indicator(run, k, i, sides < 0 ? -e : e, rates);
+        double down = sides ? base : moved_indicator(run, k, i, -e, rates), factor = 1.0;
         table[level][0] = sides ? sides * (up - down) / e : (up - down) / (2.0 * e);
         for (size_t j = 1; j <= level; j++) {
             factor *= sides ? 2.0 : 4.0;

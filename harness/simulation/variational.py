@@ -67,7 +67,6 @@ from .variational_loop import (
     TOO_MANY_STEPS,
     TUNABLE,
     UNSETTLED,
-    ElementStruct,
     ParameterStruct,
     RunStruct,
     load_library,
@@ -88,12 +87,12 @@ RESET = 100.0  # in tolerances: smaller changes of the states at the start are e
 
 @dataclass
 class Known:
-    """A parameter: its variable, all values of its array, and how it is changed.
+    """A parameter: its variable, its value, and how it is changed.
 
     Attributes
     ----------
-    variable, array, element
-        Its variable, the values of its array, or its value alone, and its index among these.
+    variable, value
+        Its variable and its value.
     state : int
         Index of the state whose start value it is, or -1.
     input : int
@@ -104,16 +103,10 @@ class Known:
     """
 
     variable: Any
-    array: np.ndarray
-    element: int
+    value: float
     state: int
     input: int
     side: int | None = None
-
-    @property
-    def value(self) -> float:
-        """Return the value."""
-        return float(self.array[self.element])
 
     @property
     def is_set(self) -> bool:
@@ -200,26 +193,26 @@ class VariationalRun:
 
     def select_known(self, variable: Any) -> Known:
         """Return what is needed of a parameter."""
+        value = float(self.settings.get(variable, variable.start or 0.0))
         if variable in self.states:
-            value = float(self.settings.get(variable, variable.start))
-            return Known(variable, np.array([value]), 0, self.states.index(variable), -1)
+            return Known(variable, value, self.states.index(variable), -1)
         if variable in self.inputs:
-            return Known(variable, np.ones(1), 0, -1, self.inputs.index(variable))
-        return Known(variable, np.array([float(self.settings.get(variable, variable.start or 0.0))]), 0, -1, -1)
+            return Known(variable, 1.0, -1, self.inputs.index(variable))
+        return Known(variable, value, -1, -1)
 
     def allocate(self, groups: dict[str, list[Any]]) -> None:
         """Allocate the buffers of the loop."""
         from scipy.integrate import DOP853
 
         instance, n, m, q, is_fmi2 = self.instance, self.n, self.m, self.q, self.instance.is_fmi2
-        size, widest = max(n * (1 + m), 1), max((len(known.array) for known in self.knowns), default=1)
+        size = max(n * (1 + m), 1)
         self.times = np.asarray(self.spec.times, dtype=float)
         self.arrays: dict[str, np.ndarray] = {
             "k": np.zeros((EXTENDED, size)),
             "dense": np.zeros((DENSE, size)),
             "nominals": np.ones(max(n, 1)),
             "samples": np.zeros((SAMPLES, max(q, 1))),
-            "work": np.zeros(len(self.inputs) + 2 * n + widest + 2),
+            "work": np.zeros(len(self.inputs) + 2 * n + 3),
             "times": self.times,
             "values": np.full((len(self.times), 1 + m, len(self.spec.outputs)), nan),
             "table": np.zeros((2, 1 + len(self.inputs))),
@@ -228,19 +221,20 @@ class VariationalRun:
         self.arrays |= {name: np.zeros(max(q, 1)) for name in ("g", "g1", "largest_g", "t_far", "g_far")}
         self.arrays |= {name: np.ascontiguousarray(getattr(DOP853, key)) for name, key in TABLEAU.items()}
         self.allocate_logs()
+        groups["modes"] = [instance.variables[name] for name in self.modes]
         groups["outputs"] = [instance.variables[name] for name in self.spec.outputs]
         outputs = [unknown.variable for unknown in instance.description.outputs]
         groups["influenced"] = [*groups["rates"], *(output for output in outputs if output.type in REAL_TYPES)]
         self.references = {name: instance.make_references(group) for name, group in groups.items()}
         self.structs = (ParameterStruct * max(m, 1))()
         self.change_values({})
-        modes = [instance.variables[name] for name in self.modes]
-        self.mode_structs = (ElementStruct * max(len(modes), 1))()
-        for mode, variable in zip(self.mode_structs, modes, strict=False):
-            mode.reference, mode.width, mode.element = variable.valueReference, 1, 0
         run = self.run = RunStruct(instance=instance.component, fmi=2 if is_fmi2 else 3, n=n, m=m, q=q)
         run.r, run.n_inputs, run.n_times = len(self.spec.outputs), len(self.inputs), len(self.times)
-        run.n_modes, run.n_signals, run.duration = len(modes), len(self.columns.get(TIME, ())), self.stop - self.start
+        run.n_modes, run.n_signals, run.duration = (
+            len(self.modes),
+            len(self.columns.get(TIME, ())),
+            self.stop - self.start,
+        )
         run.n_influenced = len(groups["influenced"])
         version = instance.description.fmiVersion
         names = [*FUNCTIONS[version], "GetDirectionalDerivative"]
@@ -254,7 +248,7 @@ class VariationalRun:
         }
         for field, name in functions.items():
             setattr(run, field, cast(instance.function(name), c_void_p))
-        for field, references in {**self.references, "parameters": self.structs, "modes": self.mode_structs}.items():
+        for field, references in {**self.references, "parameters": self.structs}.items():
             setattr(run, field, cast(references, c_void_p))
         for field, array in self.arrays.items():
             setattr(run, field, array.ctypes.data)
@@ -271,9 +265,12 @@ class VariationalRun:
         for known, side in zip(self.knowns, sides, strict=True):
             known.side = side
         for struct, known in zip(self.structs, self.knowns, strict=False):
-            struct.reference, struct.element, struct.input = known.variable.valueReference, known.element, known.input
-            struct.width, struct.value = 0 if known.state >= 0 else len(known.array), known.value
-            struct.all, struct.kind = known.array.ctypes.data, known.kind
+            struct.reference, struct.input, struct.is_start = (
+                known.variable.valueReference,
+                known.input,
+                known.state >= 0,
+            )
+            struct.value, struct.kind = known.value, known.kind
 
     def allocate_logs(self) -> None:
         """Allocate the logs of events and of times without derivatives, and the table of inputs."""
@@ -318,11 +315,10 @@ class VariationalRun:
 
     def derive(self, known: Known, unknowns: Any, count: int) -> np.ndarray:
         """Return the partial derivatives (count,) of unknowns by a parameter."""
-        seed, values = np.zeros(len(known.array)), np.zeros(count)
-        seed[known.element] = 1.0
+        seed, values = np.ones(1), np.zeros(count)
         pointers: list[Any] = [c_void_p(array.ctypes.data) for array in (seed, values)]
         if not self.instance.is_fmi2:
-            pointers = [pointers[0], c_size_t(len(seed)), pointers[1], c_size_t(count)]
+            pointers = [pointers[0], c_size_t(1), pointers[1], c_size_t(count)]
         arguments = (unknowns, c_size_t(count), (c_uint32 * 1)(known.variable.valueReference), c_size_t(1))
         self.call("GetDirectionalDerivative", *arguments, *pointers)
         return values

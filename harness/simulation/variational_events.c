@@ -37,21 +37,15 @@ static void release(const Run *run, void *state)
 
 static bool read_modes(const Run *run, int64_t *modes)
 {
-    bool ok = true;
-    for (size_t i = 0; i < run->n_modes; i++) {
-        const Element *mode = run->modes + i;
-        int64_t all[mode->width];
-        if (run->fmi == 2) {
-            int value = 0;
-            ok &= ((int (*)(Instance, const Reference *, size_t, int *))run->get_mode)(run->instance, &mode->reference,
-                                                                                     1, &value) <= WARNING;
-            modes[i] = value;
-        } else {
-            ok &= ((int (*)(Instance, const Reference *, size_t, int64_t *, size_t))run->get_mode)(
-                      run->instance, &mode->reference, 1, all, mode->width) <= WARNING;
-            modes[i] = all[mode->element];
-        }
-    }
+    size_t n = run->n_modes;
+    int values[n + 1];
+    if (!n) return true;
+    if (run->fmi == 3)
+        return ((int (*)(Instance, const Reference *, size_t, int64_t *, size_t))run->get_mode)(
+                   run->instance, run->modes, n, modes, n) <= WARNING;
+    bool ok = ((int (*)(Instance, const Reference *, size_t, int *))run->get_mode)(run->instance, run->modes, n,
+                                                                                 values) <= WARNING;
+    for (size_t i = 0; i < n; i++) modes[i] = values[i];
     return ok;
 }
 
@@ -135,9 +129,9 @@ static double time_shift(const Run *run, const double *rates)
 /* Differences (q) of the indicators over 2 e seconds of motion with these rates. */
 static void differences(Run *run, double e, const double *rates, double *result)
 {
-    moved_indicator(run, 0, run->m, e, rates, NULL);
+    moved_indicator(run, 0, run->m, e, rates);
     memcpy(result, run->g1, run->q * sizeof(double));
-    moved_indicator(run, 0, run->m, -e, rates, NULL);
+    moved_indicator(run, 0, run->m, -e, rates);
     for (size_t k = 0; k < run->q; k++) result[k] -= run->g1[k];
 }
 
@@ -232,9 +226,9 @@ static int gradients(Run *run, const size_t *which, size_t count, const double *
             bool is_input = run->parameters[i].input >= 0;
             double share = share_of(run, run->z + n * (1 + i));
             double e = fmin(share > 0.0 ? SHIFT / share : INFINITY, is_input ? SHIFT : INFINITY);
-            gradient[i] = e < INFINITY ? indicator_slope(run, which[l], i, e, 0, rates, NULL) : 0.0;
+            gradient[i] = e < INFINITY ? indicator_slope(run, which[l], i, e, 0, rates) : 0.0;
         }
-        gradient[m] = indicator_slope(run, which[l], m, shift, 0, rates, NULL);
+        gradient[m] = indicator_slope(run, which[l], m, shift, 0, rates);
     }
     for (size_t i = 0; i < m && count; i++) {
         if (run->parameters[i].kind != FIXED) continue;
@@ -255,7 +249,7 @@ static int gradients(Run *run, const size_t *which, size_t count, const double *
             run->indicator = (int64_t)i;
             if (parameter->side == NO_SIDE) return NO_NEIGHBOUR;
             double e = parameter->value != 0.0 ? SHIFT * fabs(parameter->value) : SHIFT;
-            gradient[i] += indicator_slope(run, which[l], i, e, (int)parameter->side, rates, parameter->all);
+            gradient[i] += indicator_slope(run, which[l], i, e, (int)parameter->side, NULL);
         }
         for (size_t i = 0; i <= m; i++)
             if (!isfinite(gradient[i])) return NO_VALUE;
@@ -342,12 +336,8 @@ static int states_after(Run *run, void *saved, const double *y, const double *ra
     double t = run->t + e * slope + delay, point[run->n + 1];
     for (size_t j = 0; j < run->n; j++) point[j] = y[j] + e * direction[j] + delay * rates[j];
     if (!restore(run, saved) || !set_point(run, t, point) || !call(run, run->enter_event)) return FAILED;
-    if (i < run->m && run->parameters[i].kind == TUNABLE) {
-        const Parameter *parameter = run->parameters + i;
-        bool ok = set_parameter(run, i, parameter->all, parameter->value + e);
-        parameter->all[parameter->element] = parameter->value;
-        if (!ok) return FAILED;
-    }
+    bool is_set = i < run->m && run->parameters[i].kind == TUNABLE;
+    if (is_set && !set_parameter(run, i, run->parameters[i].value + e)) return FAILED;
     int status = update_states(run, t);
     if (status != REACHED) return status;
     return get_array(run, run->get_states, states, run->n) && call(run, run->enter_continuous) ? REACHED : FAILED;

@@ -30,22 +30,14 @@ class ParameterStruct(Structure):
 
     _fields_ = (
         ("reference", c_uint32),
-        ("width", c_size_t),
-        ("element", c_size_t),
+        ("is_start", c_bool),
         ("input", c_int64),
         ("value", c_double),
-        ("all", c_void_p),
         ("kind", c_int64),
         ("side", c_int64),
         ("change", c_double),
         ("starts", c_void_p * 5),
     )
-
-
-class ElementStruct(Structure):
-    """The struct Element of variational.c."""
-
-    _fields_ = (("reference", c_uint32), ("width", c_size_t), ("element", c_size_t))
 
 
 FUNCTION_FIELDS = ("set_time", "set_states", "get_rates", "get_indicators", "get", "set", "derive", "complete")
