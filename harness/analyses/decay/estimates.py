@@ -11,7 +11,7 @@ From the first and the last turning point: the single loss that leads from the f
 spring this is the textbook's logarithmic decrement or linear envelope; for a pendulum it comes from the return map.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import optimize
@@ -19,6 +19,7 @@ from scipy import optimize
 from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from .decay_problem import DecayProblem, column_norms, least_squares
+from .dependences import LowSpeedRise
 from .intervals import FitUncertainty, confidence_interval, extend_interval, to_correlation
 from .law import (
     AMPLITUDE,
@@ -33,6 +34,7 @@ from .law import (
     damping_ratio,
     friction_from_envelope,
     iterate_return_map,
+    unit_scales,
 )
 from .model_selection import FittedLaw
 from .samples import Extrema
@@ -78,17 +80,11 @@ def quantity_labels(record: Motion) -> dict[int, tuple[str, str, str]]:
     }
 
 
-def unit_scales(problem: DecayProblem) -> dict[int, float]:
-    """Return the unit of each unknown of the problem, in units of the record, by its index in UNKNOWNS."""
-    scale = problem.scale
-    return {OMEGA: 1.0, ZETA: 1.0, R: scale, B: 1 / scale, REST: scale, DRIFT: scale}
-
-
 def to_record_units(
     record: Motion, problem: DecayProblem, unknown: int, value: float, error: float, low: float, high: float
 ) -> Estimate:
     """Return an estimate of one of the UNKNOWNS, converted from the units of the problem to those of the record."""
-    scale, offset = unit_scales(problem)[unknown], problem.offset if unknown == REST else 0.0
+    scale, offset = unit_scales(problem.scale)[unknown], problem.offset if unknown == REST else 0.0
     name, unit, text = quantity_labels(record)[unknown]
     return Estimate(
         name, scale * value + offset, scale * error, scale * low + offset, scale * high + offset, unit, text
@@ -135,6 +131,17 @@ def make_estimates(
             value, ends = float(law.p[unknown]), extend_interval(float(law.p[unknown]), *intervals[unknown])
             estimates[unknown] = to_record_units(record, problem, unknown, value, errors[unknown], *ends)
     return estimates
+
+
+def widen_losses(estimates: dict[int, Estimate], rise: LowSpeedRise) -> dict[int, Estimate]:
+    """Return the estimates; the intervals of the losses cover those with a rise of friction at low speed too."""
+    widened = dict(estimates)
+    for unknown, estimate in estimates.items():
+        if estimate.name in rise.losses:
+            least, most = (loss - estimate.value for loss in rise.losses[estimate.name])
+            low, high = max(estimate.low + min(least, 0.0), 0.0), estimate.high + max(most, 0.0)
+            widened[unknown] = replace(estimate, error=max(estimate.error, -least, most), low=low, high=high)
+    return widened
 
 
 def force_estimates(

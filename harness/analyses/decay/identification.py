@@ -5,8 +5,7 @@
 2. Estimate the losses from the energy lost per half cycle (law.py), then fit the numbered turning points.
 3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
-5. Test the residuals against time (intervals.py), and look for friction that rises at low speed
-   (low_speed_friction.py).
+5. Test the residuals against time, phase, speed and direction (dependences.py).
 6. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
 
 References
@@ -26,17 +25,18 @@ from ...errors import HarnessError, check_names, option_text
 from ...records.motion import NO_UNIT, RATE_SUFFIXES, Motion
 from ..estimation.estimate import Estimate
 from .decay_problem import DecayProblem, FitError
+from .dependences import LowSpeedRise, find_dependences
 from .estimates import (
     KnownParameters,
     estimate_from_extrema,
     estimate_from_two_peaks,
     force_estimates,
     make_estimates,
+    widen_losses,
 )
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, OMEGA, REST, TERMS, EnergyLoss, Terms, loss_fractions
-from .low_speed_friction import LowSpeedRise, find_low_speed_rise, widen_losses
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import ambiguity_remark, check_fit, is_unreliable, make_remarks, rise_remark
 from .samples import Extrema, block_size, estimate_noise, find_extrema, remove_spikes, thin, thinning_error
@@ -236,7 +236,7 @@ def identify_record(
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
     unknowns = 5 + len(terms) + drift
-    whole_decay, half_period = select_decay(record, parameters.pendulum)
+    whole_decay, half_period, choices = select_decay(record, parameters.pendulum)
     _, quantiser_step = estimate_noise(whole_decay.t, whole_decay.x)
     record, decay = thin_around(record, whole_decay, half_period)
     extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
@@ -252,19 +252,19 @@ def identify_record(
     fit = free_motion.p, free_motion.sum_of_squares
     laws = fit_all_laws(problem, fit, terms, amplitudes, lambda share: report(0.5 + 0.4 * share))
     full = next(law for law in laws if law.terms == terms)
-    uncertainty = estimate_uncertainty(problem, full.p, terms)
+    uncertainty = estimate_uncertainty(problem, full.p, terms, choices)
     check_fit(record, problem, full, uncertainty, parameters.pendulum)
+    rise = uncertainty.dependences.rise
+    if rise is not None and free_motion.whole is not None:  # the part left out may be where friction rises
+        of_whole = find_dependences(*free_motion.whole, terms).rise
+        rise = of_whole if of_whole is not None and of_whole.is_shown else replace(rise, limit=np.inf)
     reported = select_reported_law(laws, full, problem)
     by_unknown = make_estimates(record, problem, reported, full, uncertainty)
-    estimates = tuple(by_unknown.values())
     remarks = [*make_remarks(record, problem, full, uncertainty)]
-    rise = find_low_speed_rise(problem, full.p, terms)
-    if rise is not None and free_motion.whole is not None:  # the part left out may be where friction rises
-        of_whole = find_low_speed_rise(*free_motion.whole, terms)
-        rise = of_whole if of_whole is not None and of_whole.is_shown else replace(rise, limit=np.inf)
     if rise is not None and rise.is_shown:
-        estimates = widen_losses(estimates, rise)
         remarks.append(rise_remark(record, rise))
+        by_unknown = widen_losses(by_unknown, rise)
+    estimates = tuple(by_unknown.values())
     if is_unreliable(problem, uncertainty):
         estimates = tuple(replace(estimate, error=np.nan, low=np.nan, high=np.nan) for estimate in estimates)
     by_unknown = dict(zip(by_unknown, estimates, strict=True))

@@ -71,6 +71,11 @@ def unknown_indices(terms: Terms, drift: bool) -> np.ndarray:
     return np.array(basic + [UNKNOWNS.index(term) for term in terms])
 
 
+def unit_scales(scale: float) -> dict[int, float]:
+    """Return the unit of each unknown that is reported, in units of the record, for positions in units of `scale`."""
+    return {OMEGA: 1.0, ZETA: 1.0, R: scale, B: 1 / scale, REST: scale, DRIFT: scale}
+
+
 def describe_law(terms: Terms) -> str:
     """Return the names of the terms, as in 'viscous damping and dry friction'."""
     *others, last = (TERM_NAMES[term] for term in terms)

@@ -6,9 +6,9 @@ from ...errors import command_text, option_text
 from ...records.motion import Motion
 from . import thresholds
 from .decay_problem import DecayProblem, FitError
+from .dependences import CAUSES, LowSpeedRise
 from .intervals import FitUncertainty
 from .law import AMPLITUDE, OMEGA, REST
-from .low_speed_friction import LowSpeedRise
 from .model_selection import FittedLaw, deviance_difference
 
 WIDENED = "The intervals are widened."
@@ -84,28 +84,19 @@ def make_remarks(
             f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. "
             "The intervals are widened."
         )
-    remarks += departures_remark(problem, uncertainty, unit)
+    remarks += dependences_remark(problem, uncertainty.dependences.sizes, unit)
     return (*remarks, *rounding_remark(problem, full, unit))
 
 
-def departures_remark(problem: DecayProblem, uncertainty: FitUncertainty, unit: str) -> list[str]:
-    """Return a remark on slow departures of phase, amplitude and rest position from the law."""
-    found, causes = (
-        uncertainty.departures,
-        {
-            "phase": "a clock whose rate varies",
-            "amplitude": "a loss that follows another law",
-            "rest": "a sensor that drifts",
-        },
-    )
-    shown = {name: size * problem.scale for name in causes if (size := getattr(found, name)) > 0}
-    if not shown:
+def dependences_remark(problem: DecayProblem, sizes: dict[str, float], unit: str) -> list[str]:
+    """Return a remark on what the residuals depend."""
+    if not sizes:
         return []
-    sizes = " or ".join(f"in {name} by {size:.1g} {unit}" for name, size in shown.items())
-    remedy = f" {option_text('drift', True)} fits a constant drift." if found.rest and not problem.drift else ""
+    parts = " or ".join(f"in {name} by {size * problem.scale:.1g} {unit}" for name, size in sizes.items())
+    remedy = f" {option_text('drift', True)} fits a constant drift." if "rest" in sizes and not problem.drift else ""
     return [
-        f"The record departs slowly from the law, {sizes} (rms), as with "
-        f"{' or '.join(causes[name] for name in shown)}. {WIDENED}{remedy}"
+        f"The record departs from the law, {parts} (rms), as with {' or '.join(CAUSES[name] for name in sizes)}. "
+        f"{WIDENED}{remedy}"
     ]
 
 
@@ -160,7 +151,8 @@ def rise_remark(record: Motion, rise: LowSpeedRise) -> str:
     """Return the remark on friction that rises at low speed."""
     return (
         f"Friction that rises at low speed fits better: it is {rise.size:.2g} {record.base} (over stiffness) larger at "
-        f"standstill than the {rise.losses['r']:.2g} {record.base} above about {rise.speed:g} of the first peak speed. "
-        "No law of decay has such a rise. The intervals of the losses are widened, and may still miss the true values: "
+        f"standstill than about {np.mean(rise.losses['r']):.2g} {record.base} above {rise.speed:g} of the first peak "
+        "speed. No law of decay has such a rise. The intervals of the losses are widened, and may still miss the true "
+        "values: "
         f"fit a model with Stribeck friction by {command_text('fit')}."
     )

@@ -44,8 +44,7 @@ LARGE_SWING = 2.0  # rad, amplitude from which on a pendulum swings in no wave
 NO_WAVE = 0.05  # of the power of a cycle
 MANY_SWINGS = 12  # swings that show whether a motion is regular, grows or is constant
 LARGE_PART = 0.5  # of the record: a longer decay needs no other half period
-SMALL_PART = 0.25  # of the swings: a shorter decay may be a chance
-LARGE_FIRST = 1.5  # times the median swing: a shorter decay from such a swing is no chance
+SMALL_PART = 0.25  # of the swings: both halves of a shorter decay must be decays
 IRREGULAR = 0.3  # standard deviation of the logarithm of the times between turning points
 SAWTOOTH = 2.0  # ratio of the times of rise and fall
 MAX_NODE_SWINGS = 6  # swings from the end of a decay to the node of a beat
@@ -90,10 +89,9 @@ MAX_DAMPING_RATIO = 0.9  # beyond, nothing oscillates
 # --- Free motion (free_motion.py) ---
 CERTAIN_TIME = 0.6  # half periods after the last turning point: the motion certainly goes on as long
 MIN_QUANTISER_STEPS = 2.0  # between the turning points of a half cycle: with fewer, a record repeats one value
-DISTURBED_START = 2.0  # times the noise and the other residuals: a first half cycle with larger ones is no free motion
 BETTER_START = 0.5  # of the mean square of the residuals: a start is left out only if that halves it at least
 MAX_OUTLIERS = 0.001  # fraction of the samples, in addition to two: a record with more does not follow the law
-DISTURBED = 2.0  # times the noise: residuals of a record that departs from the law somewhere
+DISTURBED = 2.0  # times the noise, or the others: residuals of a record, or of its start, that departs from the law
 UNDISTURBED_PARTS = (0.8, 0.6, 0.35)  # fractions of the turning points that are tried as undisturbed
 MIN_UNDISTURBED = 6  # turning points before a disturbance, to know the law that it departs from
 MAX_EXTENSIONS = 6  # of the samples before a disturbance: each fit is valid a little farther than its samples
@@ -109,20 +107,20 @@ EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by m
 # --- Intervals (intervals.py) ---
 BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)  # lengths on which residuals may be correlated
 MIN_BLOCKS, MAX_BLOCKS = 24, 400  # fewer leave the variance uncertain; more are shorter than any correlation
-WALK_PIECES = 8  # of the random walk of phase, amplitude and rest position over a record
-SEEN_WALK = 1e-9  # of the largest eigenvalue: smaller ones are walks that the fitted values follow
-PROVEN_WALK = 4.0  # of the logarithm of the likelihood: white noise exceeds it in one record of 400
 NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
 MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
 INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain
 
-# --- Friction that rises at low speed (low_speed_friction.py) ---
+# --- Test of the residuals (dependences.py) ---
+WALK_PIECES = 8  # of the random walk of phase, amplitude and rest position over a record
+SEEN = 1e-9  # of the largest eigenvalue, or singular value: smaller parts are those that the fitted values follow
+PROVEN = 4.0  # of the logarithm of the likelihood: white noise exceeds it in one record of 400
 RISE_SPEEDS = (0.05, 0.1, 0.2, 0.4)  # of the first peak speed: the rise falls to 1/e there
 MIN_RISE_HALF_CYCLES = 8  # with fewer, the laws with three losses follow every rise
-SHOWN_RISE = 10.0  # of n ln(squares): chance exceeds it in one record of 1000 for each speed
+SHOWN_RISE = 3.3  # standard errors: chance exceeds it in one record of 1000 for each speed
+RISE_BLOCKS = (24, 100)  # of residuals that may be correlated
 MAX_RISE = 3.0  # times the friction at high speed: a larger one is another departure from the law
 LIMIT_SPEED = 0.1  # of RISE_SPEEDS: the one for which the limit is stated
-RISE_BLOCKS = (24, 100)  # of residuals that may be correlated
 MIN_SENSITIVITY = 1e-3  # of an amplitude to the first one
 
 # --- Remarks and refusals (remarks.py) ---

@@ -103,11 +103,18 @@ class Decay:
         first, last = float(self.swings.size[self.first]), float(self.swings.size[self.last])
         return (self.end - self.begin) * float(np.sqrt(first * max(first - last, 0.0)))
 
+    @property
+    def is_proven(self) -> bool:
+        """Whether both halves are decays if the decay is the best of many: some swings fall by chance."""
+        middle = (self.first + self.last) // 2
+        is_large = self.count >= thresholds.SMALL_PART * len(self.swings.size)
+        return is_large or (has_loss(self.swings, self.first, middle) and has_loss(self.swings, middle, self.last))
 
-def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float]:
-    """Return the part of a record that holds its free decay, and its half period in s.
 
-    It is the record itself if this holds little else.
+def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float, int]:
+    """Return the part of a record that holds its free decay, its half period in s, and of how many decays it is one.
+
+    It is the record itself, one of one, if this holds little else.
 
     Raises
     ------
@@ -121,7 +128,7 @@ def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float]:
     periods = half_periods(measured, noise)
     # the angular acceleration of a pendulum has two peaks per half cycle at large amplitudes: no window is searched
     if pendulum and record.order == 2:
-        return record, periods[0]
+        return record, periods[0], 1
     best: Decay | None = None
     motions: list[Swings] = []
     for period in periods:
@@ -129,12 +136,17 @@ def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float]:
         if swings is None:
             continue
         motions.append(swings)
-        best = max([*([best] if best else []), *find_decays(swings)], key=lambda decay: decay.weight, default=None)
+        proven = [decay for decay in find_decays(swings) if decay.is_proven]
+        best = max([*([best] if best else []), *proven], key=lambda decay: decay.weight, default=None)
         if best is not None and best.end - best.begin > thresholds.LARGE_PART * (record.t[-1] - record.t[0]):
             break
     if motions:
         check_motion(record, motions[0] if best is None else best.swings, best, pendulum)
-    return (record, periods[0]) if best is None else (crop(record, best), best.half_period)
+    if best is None:
+        return record, periods[0], 1
+    decays = find_decays(best.swings)
+    part = crop(record, best, decays)
+    return part, best.half_period, 1 if part is record else len(decays)
 
 
 def measure_swings(record: Motion, half_period: float, noise: float, pendulum: bool) -> Swings | None:
@@ -190,11 +202,17 @@ def find_decays(swings: Swings) -> list[Decay]:
     decays = []
     for before, last in zip([-1, *ends], [*ends, len(size) - 1], strict=True):
         first = skip_disturbed_swings(swings, skip_steady_swings(swings, before + 1, last), last)
-        if last - first + 1 >= thresholds.MIN_SWINGS:
-            loss, error = swings.loss(first, last)
-            if loss > thresholds.SIGNIFICANT_LOSS * error:
-                decays.append(Decay(swings, first, last))
+        if has_loss(swings, first, last):
+            decays.append(Decay(swings, first, last))
     return decays
+
+
+def has_loss(swings: Swings, first: int, last: int) -> bool:
+    """Return whether swings are enough, and lose more than their scatter explains."""
+    if last - first + 1 < thresholds.MIN_SWINGS:
+        return False
+    loss, error = swings.loss(first, last)
+    return loss > thresholds.SIGNIFICANT_LOSS * error
 
 
 def skip_steady_swings(swings: Swings, first: int, last: int) -> int:
@@ -244,10 +262,7 @@ def check_motion(record: Motion, swings: Swings, best: Decay | None, pendulum: b
     shape = float(np.nanmedian(shape)) if np.isfinite(shape := swings.shape_error[first : last + 2]).any() else 0.0
     if shape > thresholds.NO_WAVE and not is_large_pendulum:
         raise HarnessError(describe_shape(record, swings, slice(first, last + 1), shape))
-    few = best is None or (best.count < thresholds.SMALL_PART * len(size))
-    spread = duration_spread(swings.duration)
-    is_large = best is not None and size[best.first] > thresholds.LARGE_FIRST * float(np.median(size))
-    if few and not is_large and len(size) >= thresholds.MANY_SWINGS and spread > thresholds.IRREGULAR:
+    if best is None and len(size) >= thresholds.MANY_SWINGS and duration_spread(swings.duration) > thresholds.IRREGULAR:
         raise HarnessError(describe_shape(record, swings, slice(None), shape))
     if best is not None:
         if growth := find_regrowth(swings, thresholds.RIVAL * best.weight):
@@ -327,8 +342,8 @@ def find_regrowth(swings: Swings, min_weight: float) -> Decay | None:
     return next((growth for growth, n in pauses if ((n >= -1) & (n <= thresholds.MAX_NODE_SWINGS)).any()), None)
 
 
-def crop(record: Motion, best: Decay) -> Motion:
-    """Return the record of a decay, with a note; unchanged if only a rest or a cycle is before and after it."""
+def crop(record: Motion, best: Decay, decays: list[Decay]) -> Motion:
+    """Return the record of the best of decays, with a note; unchanged if only a rest or a cycle is around it."""
     swings = best.swings
     before, after = swings.size[: best.first], swings.size[best.last + 1 :]
     begin, end, reasons = float(record.t[0]), float(record.t[-1]), []
@@ -345,10 +360,12 @@ def crop(record: Motion, best: Decay) -> Motion:
     if not reasons:
         return record
     t = record.format_time
+    choice = f", one of {len(decays)}, and the intervals are widened by the choice" if len(decays) > 1 else ""
     note = (
-        f"The free decay from t = {t(begin)} to {t(end)} s is taken, {best.count} half cycles: {' and '.join(reasons)}."
+        f"The free decay from t = {t(begin)} to {t(end)} s is taken, {best.count} half cycles{choice}: "
+        f"{' and '.join(reasons)}."
     )
-    others = [other for other in find_decays(swings) if other.first > best.last or other.last < best.first]
+    others = [other for other in decays if other.first > best.last or other.last < best.first]
     if rivals := [other for other in others if other.weight > thresholds.RIVAL * best.weight]:
         spans = ", ".join(f"{t(other.begin)} to {t(other.end)}" for other in rivals)
         note += f" The record also decays from t = {spans} s: select a part with {selection_text()}."

@@ -1,7 +1,7 @@
 """Estimates of `decay` and of `fit`: values with 95 % intervals and their JSON; noise and reversals of a record."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -38,10 +38,6 @@ class Estimate:
     high: float
     unit: str
     text: str
-
-    def widen(self, error: float, *values: float) -> "Estimate":
-        """Return this estimate with at least this standard error, and with an interval that contains the values."""
-        return replace(self, error=max(self.error, error), low=min(self.low, *values), high=max(self.high, *values))
 
     def multiply(self, factor: float, name: str, unit: str, text: str, relative_error: float = 0.0) -> "Estimate":
         """Return this estimate multiplied by a `factor` that has a relative standard error of its own."""
