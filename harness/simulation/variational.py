@@ -252,6 +252,9 @@ class VariationalRun:
             setattr(run, field, cast(references, c_void_p))
         for field, array in self.arrays.items():
             setattr(run, field, array.ctypes.data)
+        if set(groups["outputs"]) <= set(self.states):
+            self.output_states = (c_uint32 * len(groups["outputs"]))(*map(self.states.index, groups["outputs"]))
+            run.output_states = cast(self.output_states, c_void_p)
         run.rtol, run.graze, run.tolerance = self.spec.rtol, TOUCH, self.tolerance
         run.capacity, run.capacity_notes = len(self.arrays["event_values"]), len(self.arrays["note_values"])
         self.y = self.arrays["z"][:n]

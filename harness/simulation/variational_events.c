@@ -138,6 +138,9 @@ static void differences(Run *run, double e, const double *rates, double *result)
 /* Note at a time that derivatives do not exist on a side (1, -1) of each parameter, on both (NaN), or exist (0). */
 static void note(Run *run, double t, int64_t indicator, int64_t reason, const double *sides)
 {
+    bool is_needed = reason == RECORDED;
+    for (size_t i = 0; i < run->m; i++) is_needed |= sides[i] != 0.0;
+    if (!is_needed) return;
     double *values = run->note_values + run->n_notes * (1 + run->m);
     int64_t *codes = run->note_codes + 2 * run->n_notes++;
     values[0] = t;
@@ -429,12 +432,12 @@ static int handle_event(Run *run, int64_t indicator, bool is_row)
         double size = fmax(fabs(new_rates[j]), fabs(rates[j]));
         differs |= fabs(new_rates[j] - rates[j]) > RESET * run->rtol * size;
     }
-    if (!jumps && !differs) return REACHED;
+    if (!jumps && !differs) return is_row ? check_ties(run, -1, no_slopes, 0.0) : REACHED;
     update_slopes(run, jumps ? moved : NULL, slopes, rates, new_rates);
     for (size_t i = 0; i < m; i++) sides[i] = NAN;
     if (!count) {
         if (!is_row) note(run, run->t, -1, NO_INDICATOR, sides);
-        return REACHED;
+        return is_row ? check_ties(run, -1, no_slopes, 0.0) : REACHED;
     }
     for (size_t l = 1; l < count; l++) {
         double others[m + 1];

@@ -90,6 +90,7 @@ class RunStruct(Structure):
         ("n_times", c_size_t),
         ("next", c_size_t),
         ("values", c_void_p),
+        ("output_states", c_void_p),
         ("indicator", c_int64),
         ("is_fresh", c_bool),
         *((name, c_void_p) for name in EVENT_FIELDS),

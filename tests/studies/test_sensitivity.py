@@ -245,6 +245,20 @@ def test_touches_and_ties_are_reported(pair, values, parameters, at, reason):
     assert has_sides == ([True, False] if "touched" in reason else [False, False])  # a smaller force adds no event
 
 
+def test_a_force_that_touches_the_limit_at_its_corner_is_reported():
+    """A smaller mu_s, or a larger force, releases the sled."""
+    fmu, force = (
+        build_native_fmus() / "stickslip.fmu",
+        {"time": [0.0, 1.0, 2.0], "F_ext": [0.0, 0.9 * 12.5 * 9.81, 0.0]},
+    )
+    values = {"v_driver": 0.0}
+    s = harness.sensitivity(fmu, ["mu_s", "F_ext"], values, inputs=force, times=[0.5, 1.5, 2.0], outputs=["x"])
+    assert s.remarks == ("No derivative by mu_s, F_ext from t = 1 s: two modes are possible (F_friction).",)
+    left, right = s.one_sided("x", "mu_s")
+    assert np.isnan(left).tolist() == [False, True, True]
+    assert right.tolist() == [0.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize(
     "seed",
     [pytest.param(n, marks=pytest.mark.slow if n in (3, 8, 10) else pytest.mark.campaign) for n in range(30)],
