@@ -1,9 +1,8 @@
 """Lowers a file: unrolls loops, selects the branches that a model needs, and replaces vectors by scalars."""
 
 import ast
-from collections import Counter
 
-from ..syntax_trees import all_nodes, parsed_module, replace_fields
+from ..syntax_trees import parsed_module, replace_fields
 from .constant_folding import known_truth
 from .layout import ModelLayout
 from .scalarize import LOOP_RANGES, METHOD_LOOP, Scalarizer
@@ -125,7 +124,7 @@ class FileLowerer:
     def lower_function(self, node: ast.FunctionDef, contacts: list[str], i: int) -> ast.FunctionDef:
         """Lower a function; its parameters `contacts` are the index `i` of a contact."""
         outer, self.scalarizer = self.scalarizer, self.new_scalarizer(dict.fromkeys(contacts, i))
-        self.scalarizer.single_values = names_with_one_value(node)
+        self.scalarizer.function = node
         names = []
         for argument in node.args.args:
             if self.has_vectors and (kind := annotated_kind(argument)):
@@ -163,15 +162,6 @@ class FileLowerer:
     def is_excluded(self, node: ast.expr) -> bool:
         """Return whether this is an excluded item, or its name."""
         return (item_label(node) or self.declared.constants.get(getattr(node, "id", ""))) in self.spec.excluded
-
-
-def names_with_one_value(node: ast.FunctionDef) -> set[str]:
-    """Return the parameters that a function does not change, and the names that one statement of it sets."""
-    stored = [argument.arg for argument in node.args.args]
-    for part in all_nodes(node):
-        for target in part.targets if isinstance(part, ast.Assign) else ():
-            stored += [name.id for name in all_nodes(target) if isinstance(name, ast.Name)]
-    return {name for name, count in Counter(stored).items() if count == 1}
 
 
 def leaves(statements: list[ast.stmt]) -> bool:

@@ -1,6 +1,7 @@
 """Rewrites expressions and simple statements of one function from vectors to scalars."""
 
 import ast
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import reduce
 
@@ -36,7 +37,7 @@ class Scalarizer(ConstantFolder):
         super().__init__(spec, declared.constants)
         self.declared, self.path, self.has_vectors = declared, path, vectors
         self.vector_kinds: dict[str, str] = {}  # vector names -> what they run over
-        self.single_values: set[str] = set()  # names of vectors that never change
+        self.function: ast.FunctionDef  # that is rewritten
         self.copies: dict[str, ast.expr] = {}  # components that are never stored -> the number that they equal
         self.allocated_names: set[str] = set()  # of vectors that are filled by component
         self.loop_indices = dict(index or {})  # loop variables -> current value
@@ -79,8 +80,10 @@ class Scalarizer(ConstantFolder):
 
     def is_elementwise(self, node: ast.AST) -> bool:
         """Return whether a call works on vectors component by component."""
-        names = {*self.declared.elementwise, *self.declared.inlined, *SELECTIONS}
-        return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+            return False
+        name, declared = node.func.id, self.declared
+        return name in declared.elementwise or name in declared.inlined or name in SELECTIONS
 
     def result_kinds(self, call: ast.Call) -> list[str | None]:
         """Return the kinds of the results of a call."""
@@ -404,7 +407,7 @@ class Scalarizer(ConstantFolder):
         """
         y = next(argument for argument in call.args if self.vector_kind(argument) == STATES)
         is_new = isinstance(f, ast.Name) and f.id not in self.vector_kinds
-        is_fixed = is_new and {*names_used(f), *names_used(y)} <= self.single_values
+        is_fixed = is_new and {*names_used(f), *names_used(y)} <= names_with_one_value(self.function)
         self.record_kinds([f], [STATES])
         computed = [self.component(f, i) for i in self.spec.dynamic_states]
         statements: list[ast.stmt] = [ast.Assign([tuple_or_single(computed)], self.visit(call))]
@@ -454,6 +457,15 @@ class Scalarizer(ConstantFolder):
         """Return whether a scalar has the name of a component in some model."""
         prefixes = tuple(f"{name}_" for name in (*self.vector_kinds, *self.jacobians, *self.systems))
         return any(name.startswith(prefixes) for name in self.scalar_names)
+
+
+def names_with_one_value(function: ast.FunctionDef) -> set[str]:
+    """Return the parameters that a function does not change, and the names that one statement of it sets."""
+    stored = [argument.arg for argument in function.args.args]
+    for part in all_nodes(function):
+        for target in part.targets if isinstance(part, ast.Assign) else ():
+            stored += [name.id for name in all_nodes(target) if isinstance(name, ast.Name)]
+    return {name for name, count in Counter(stored).items() if count == 1}
 
 
 def function_name(call: ast.Call) -> str:
