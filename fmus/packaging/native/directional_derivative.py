@@ -201,7 +201,7 @@ class TangentWriter:
                     lines += [*self.assign_tangent(f"{PREFIX}{name}", self.input_derivatives[name]), node]
                     self.with_tangent.add(name)
                 case ast.Assign(targets=[ast.Name(id=name)], value=value) if name not in self.contacts:
-                    lines += [*self.assign_tangent(f"{PREFIX}{name}", value), node]
+                    lines += self.assign_tangent(f"{PREFIX}{name}", value, name=name)
                     self.with_tangent.add(name)
                 case ast.Assign(targets=[ast.Name()]):
                     lines.append(node)
@@ -220,16 +220,22 @@ class TangentWriter:
                     lines.append(ast.Return())
         return lines
 
-    def assign_tangent(self, target: str, value: ast.expr, before: str = "") -> list[ast.stmt]:
-        """Return the statements that assign the tangent of a value, added to the tangent with the text `before`."""
+    def assign_tangent(self, target: str, value: ast.expr, before: str = "", name: str = "") -> list[ast.stmt]:
+        """Return the statements that assign the tangent of a value, added to the tangent with the text `before`.
+
+        With a `name`, they also assign the value to it, and calculate what both have in common once.
+        """
         names: dict[Expression, str] = {}
         e, by = self.read_expression(value, names)
         tangent = differentiate(e, by, of_term=term_tangent)
         if before:
             tangent = build_term("+", new_symbol(before, names), tangent)
         printer = ExpressionPrinter(names, (), self.used_names, 0)
-        printer.count_uses(tangent)
+        for operand in (tangent, e) if name else (tangent,):
+            printer.count_uses(operand)
         printer.emit(f"{target} = {printer.text(tangent)}")
+        if name:
+            printer.emit(f"{name} = {printer.text(e)}")
         self.used_names = printer.used_names  # a local variable of another statement may have another type
         return parse_statements(printer.lines)
 
