@@ -2,13 +2,16 @@
 
 RECORDS are drawn for each kind of defect (default: 60).  The table gives the share of 95 % intervals that hold, of
 records refused, and of records that are wrong without a remark: a constant whose interval misses the true value, or the
-range over which the true value drifts, by more than its own half width.  The exit status is 1 if more than 1 % are.
+range over which the true value drifts, by more than its own half width.  Decays with coloured noise, coarse steps or a
+wandering amplitude are identified in halves, and the interval of the second is the true value of the first.  The exit
+status is 1 if more than 1 % are wrong.
 """
 
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
+from decays import random_record
 from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
@@ -116,6 +119,24 @@ def check_decay(rng, kind):
     return fit.estimates, ranges, fit.remarks
 
 
+def check_halves(rng, kind):
+    """Identify both halves of a decay, whose rounding, noise or loss is that of a measurement; they must agree."""
+    record, _, _ = random_record(int(rng.integers(2**31)), None, False, kind == "quantised", 1500, 0)
+    x, n = record.x, len(record.t)
+    size = np.ptp(x) / 2
+    if kind == "coloured":
+        x = x + 0.002 * size * lfilter([0.6], [1, -0.8], rng.standard_normal(n))
+    elif kind == "wandering":  # the amplitude, by 2 %
+        knots = np.linspace(0, n - 1, 7)
+        walk = np.cumsum(rng.standard_normal(7)) / np.sqrt(7)
+        x = x.mean() + (x - x.mean()) * (1 + 0.02 * np.interp(np.arange(n), knots, walk))
+    stop = np.flatnonzero(np.abs(x - x[-1]) > 0.02 * size)[-1]  # the rest is no half
+    halves = [slice(0, stop // 2), slice(stop // 2, n)]
+    first, second = (harness.identify_decay((record.t[half], x[half]), unit="m") for half in halves)
+    ranges = {estimate.name: [estimate.low, estimate.high] for estimate in second.estimates if estimate.name != "rest"}
+    return first.estimates, ranges, [*first.remarks, *second.remarks]
+
+
 def check_fit(rng, kind):
     """Fit a driven oscillator with dry friction to a record whose input has noise, or whose sensor lags or drifts."""
     truth = {"f": rng.uniform(0.5, 1.5), "c": rng.uniform(0.2, 1.0)}
@@ -139,6 +160,7 @@ def check_fit(rng, kind):
 KINDS = {
     **dict.fromkeys(("none", "drift", "viscous drift", "lag", "presliding", "offset", "code"), check_curve),
     **dict.fromkeys(("driven", "sustained"), check_decay),
+    **dict.fromkeys(("coloured", "quantised", "wandering"), check_halves),
     **dict.fromkeys(("input noise", "sensor lag", "sensor drift"), check_fit),
 }
 
@@ -152,7 +174,8 @@ def check_record(task):
         return kind, number, None, [], str(refusal)
     held, far = [], []
     for estimate in estimates:
-        if (name := estimate.name.rstrip("+-")) not in ranges or not estimate.low <= estimate.high:  # or no interval
+        name = estimate.name.rstrip("+-")
+        if name not in ranges or not estimate.low <= estimate.high or np.isnan(ranges[name]).any():  # or no interval
             continue
         low, high = min(ranges[name]), max(ranges[name])
         held.append(estimate.low <= high and low <= estimate.high)

@@ -128,7 +128,8 @@ def find_standstill(record: Samples, blocks: Blocks, unit: str) -> tuple[float, 
         if abs(smallest - step / 2) < SAME_CODE * step:
             note = (
                 f"The velocity has steps of {step:.3g} {unit} and no code for zero: standstill reads plus or minus "
-                f"{smallest:.3g} {unit}, and samples with this speed are left out."
+                f"{smallest:.3g} {unit}, and samples with this speed are left out. Each other speed may be off by "
+                "as much, which the intervals of F_s and v_s do not contain."
             )
             return 0.0, smallest * (1 + SAME_CODE), [note]
     v, force, fastest = blocks.v, blocks.force, float(np.abs(blocks.v).max())

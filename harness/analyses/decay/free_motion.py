@@ -123,9 +123,14 @@ def skip_before_start(motion: FreeMotion) -> FreeMotion:
 
 def fit_certain_samples(motion: FreeMotion) -> FreeMotion:
     """Fit the samples up to the last turning point."""
+    return motion.search(select_certain_samples(motion))
+
+
+def select_certain_samples(motion: FreeMotion) -> DecayProblem:
+    """Return the samples up to the last turning point."""
     problem, extrema = motion.available, motion.extrema
     last = extrema.t[-1] - problem.time_origin + thresholds.CERTAIN_TIME * extrema.half_period
-    return motion.search(problem.subset(problem.t <= last))
+    return problem.subset(problem.t <= last)
 
 
 def truncate_at_stop(motion: FreeMotion) -> FreeMotion:
@@ -182,7 +187,8 @@ def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
         available, p = initial_problem(record, later, motion.terms, problem.model.is_pendulum, problem.drift)
         available = available.subset(available.t >= begin - available.time_origin)
         undisturbed = replace(motion, extrema=later, available=available, problem=available, p=p)
-        undisturbed = remove_outliers(truncate_at_stop(fit_certain_samples(undisturbed)))
+        undisturbed = undisturbed.fit(select_certain_samples(undisturbed))
+        undisturbed = remove_outliers(truncate_at_stop(undisturbed))
         share = undisturbed.sum_of_squares / len(undisturbed.problem.t) * (available.scale / problem.scale) ** 2
         if share < thresholds.BETTER_START * mean_square:
             return undisturbed.add_note(

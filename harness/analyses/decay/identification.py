@@ -24,6 +24,7 @@ import numpy as np
 from ...errors import HarnessError, check_names, option_text
 from ...records.motion import NO_UNIT, RATE_SUFFIXES, Motion
 from ..estimation.estimate import Estimate
+from . import thresholds
 from .decay_problem import DecayProblem, FitError
 from .dependences import LowSpeedRise, find_dependences
 from .estimates import (
@@ -212,7 +213,8 @@ def suggest_remedy(record: Motion, parameters: KnownParameters, drag: bool, drif
             "beyond 90 degrees the angular acceleration of a pendulum has two peaks per half cycle: record the angle "
             f"or the angular velocity, or leave out the large amplitudes with {option_text('begin')}"
         )
-    if not drift:
+    means = [part.mean() for part in np.array_split(record.x, thresholds.DRIFT_PARTS)]
+    if not drift and abs(np.corrcoef(means, range(thresholds.DRIFT_PARTS))[0, 1]) > thresholds.DRIFT_CORRELATION:
         with suppress(HarnessError):
             with_drift = identify_record(record, parameters, drag, True, lambda share: None)
             total = next(estimate.value for estimate in with_drift.estimates if estimate.name == "drift") * np.ptp(

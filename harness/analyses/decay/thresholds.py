@@ -130,6 +130,7 @@ NOT_NOISE = 2.0  # times the noise: smaller residuals are no reason to refuse a 
 UNRELIABLE = 0.05  # fraction of the motion: with larger residuals that are no noise, no interval is stated
 WARNED = 0.008  # fraction of the motion: with larger residuals the remark is a warning
 NOISELESS = 3e-4  # of the amplitude: records with less noise are often simulated
+DRIFT_PARTS, DRIFT_CORRELATION = 8, 0.8  # of the means of parts with time, from which on a drift is tried
 EXACT = 1e-9  # of the amplitude: smaller residuals are those of the model, and need no remark
 CLEAR_BIC = 6.0  # difference of BIC: odds of 20 to 1
 SIGNIFICANT_DEVIANCE = 4.0  # of n ln(squares): an unnecessary term exceeds it in one record of twenty
