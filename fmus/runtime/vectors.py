@@ -105,16 +105,20 @@ def select_kinematic(a, b):
     """Take `a` for states whose rate is a state and `b` for the others."""
 
 
+@inlined
 def dynamic_part(a):
     """Return a, with zeros for states whose rate is a state."""
+    return select_kinematic(0.0, a)
 
 
 def kinematic_rates(y):
     """Return, for states whose rate is a state, that rate."""
 
 
-def complete_rates(y: StateVector, others) -> StateVector:
+@inlined
+def complete_rates(y, others):
     """Return the rates at y: those that are states from y, the others from a vector."""
+    return select_kinematic(kinematic_rates(y), others)
 
 
 def multiply(J, a: StateVector) -> StateVector:

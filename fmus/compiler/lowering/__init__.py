@@ -12,7 +12,8 @@
 
 An annotation such as `e: StateVector` of a parameter, result or class attribute declares a vector; results of vector
 operations are vectors.  Components are named after the states and modes of the model: y2_x and y2_v of y2, modes0_mode
-of modes0, J_v_x of a Jacobian J.
+of modes0, J_v_x of a Jacobian J.  f = model.rates(t, y, modes) has all rates: the generated method computes those that
+are no states, and the others are copies of y.
 
 A ConditionVector is stored in a list, as in margins[:] = model.condition_margins(t, y, modes).
 

@@ -14,6 +14,7 @@ from .vector_symbols import SELECTIONS, SourceSymbols, annotated_kind
 REDUCTIONS: dict[str, ast.cmpop] = {"max_of": ast.Gt(), "min_of": ast.Lt()}  # reductions to one component
 ALLOCATORS = ("state_vector", "contact_vector")
 LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices", "planar_indices")  # iterables of loops
+SIMPLE = (ast.Name, ast.Attribute, ast.Constant)  # arguments that an inlined function may use twice
 METHOD_LOOP = "methods"  # iterable of (label, module, class)
 INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place", "is_planar": "is_planar"}
 
@@ -116,9 +117,10 @@ class Scalarizer(ConstantFolder):
                 return ast.Compare(self.component(left, place), ops, [self.component(right, place)])
             case ast.Call(func=ast.Name(id=name), args=args) if name in self.declared.inlined:
                 parameters, expression = self.declared.inlined[name]
-                if not all(isinstance(argument, (ast.Name, ast.Attribute, ast.Constant)) for argument in args):
-                    raise self.error(node)
                 arguments = dict(zip(parameters, args, strict=True))
+                uses = Counter(part.id for part in all_nodes(expression) if isinstance(part, ast.Name))
+                if any(uses[name] > 1 and not isinstance(part, SIMPLE) for name, part in arguments.items()):
+                    raise self.error(node)  # it would be calculated again
                 return self.component(Substitution(arguments).visit(expression), place)
             case ast.IfExp(test=test, body=body, orelse=other):
                 return ast.IfExp(*(self.component(part, place) for part in (test, body, other)))
@@ -128,11 +130,6 @@ class Scalarizer(ConstantFolder):
                 return self.component(angle if place in self.spec.angle_states else other, place)
             case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
                 return self.component(other if place in self.spec.dynamic_states else moved, place)
-            case ast.Call(func=ast.Name(id="complete_rates"), args=[states, others]):
-                dynamic = place in self.spec.dynamic_states
-                return self.component(others, place) if dynamic else self.component(states, self.spec.rate_place(place))
-            case ast.Call(func=ast.Name(id="dynamic_part"), args=[argument]):
-                return self.component(argument, place) if place in self.spec.dynamic_states else ast.Constant(0.0)
             case ast.Call(func=ast.Name(id="kinematic_rates"), args=[argument]):
                 return self.component(argument, self.spec.rate_place(place))
             case ast.Call(func=function, args=args) if self.is_elementwise(node):

@@ -8,7 +8,7 @@ from .. import BuildError
 from ..syntax_trees import all_nodes, parsed_module, parsed_nodes
 from .layout import CONDITIONS, CONTACTS, STATES
 
-SELECTIONS = ("select_angles", "select_kinematic", "dynamic_part", "kinematic_rates", "complete_rates")
+SELECTIONS = ("select_angles", "select_kinematic", "kinematic_rates")
 VECTOR_KINDS = {"StateVector": STATES, "Rates": STATES, "ContactVector": CONTACTS, "ConditionVector": CONDITIONS}
 
 
