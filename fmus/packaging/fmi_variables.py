@@ -92,8 +92,12 @@ def all_variables(model: Any) -> Variables:
         tail, of_mode = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
         stick_text = f"event indicator{of_mode}: speed in the direction of sliding; 1 while stuck"
         slip_text = f"event indicator{of_mode}: holding limit minus load on the body at rest; 1 while sliding"
+        unit = meanings[slip].unit if slip else speed
+        if mode in getattr(model, "planar_modes", ()):
+            unit, stick_text = "1", f"event indicator{of_mode}: slip, relative to that at the last event; 1 while stuck"
+            slip_text = slip_text.replace("1 while sliding", "while sliding, the share of growth left")
         added += [
-            (TO_REST + tail, ContinuousLocal(meanings[slip].unit if slip else speed, stick_text)),
+            (TO_REST + tail, ContinuousLocal(unit, stick_text)),
             (TO_BREAK_AWAY + tail, ContinuousLocal(force, slip_text)),
         ]
     for n in range(model.n_event_functions - model.first_condition):

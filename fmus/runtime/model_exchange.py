@@ -209,8 +209,8 @@ def update_indicators(run, model):
                         # after an event the slip is zero but for rounding errors, of either sign
                         to_rest[i] = solver.modes[i] * slips[i] + INDICATOR_OFFSET * sizes[i] + TINY
                         if is_planar[i]:
-                            to_rest[i] = planar_contact.progress(model, solver.t, solver.y, i)
-                            to_rest[i] += INDICATOR_OFFSET * sizes[i] + TINY
+                            to_rest[i] = planar_contact.progress(model, solver.t, solver.y, i) - model.approach[i]
+                            to_rest[i] = (to_rest[i] + INDICATOR_OFFSET * sizes[i] + TINY) / model.unit_slip[i]
                             to_break_away[i] = planar_contact.growth_left(model, solver.t, solver.y, i)
                 else:
                     slack = ROUNDOFF_MARGIN * terms[i]
@@ -351,8 +351,8 @@ def update_modes(run, model):
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes
         for i in planar_indices:
-            needs_restart = needs_restart or planar_contact.growth_left(model, solver.t, y, i) < 0.0
-            solver.modes[i] = planar_contact.begin_phase(model, step, solver.t, y, modes, i)
+            if planar_contact.begin_phase(model, step, solver.t, y, modes, i):
+                needs_restart = True
     else:
         for i in contact_indices:
             last_mode = solver.modes[i]

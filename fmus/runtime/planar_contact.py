@@ -16,7 +16,7 @@ A body whose load exceeds the friction leaves along its load from where its slip
 from math import inf, sqrt
 
 from . import contact_lcp
-from .codes import BACKWARD, EPSILON, FORWARD, ROUNDOFF_MARGIN, STUCK
+from .codes import EPSILON, FORWARD, ROUNDOFF_MARGIN, STUCK
 from .contact_lcp import CoupledFriction
 from .vectors import (
     ContactIndex,
@@ -38,10 +38,14 @@ SMALLEST_TOLERANCE = 1e-13  # lower ones are rounding errors
 RESOLVED = 100.0  # shortest steps in which a slip vanishes that a method can resolve
 CONSTANT_SHARE = 0.01  # of the excess of friction over load, by which the load may change up to the rest
 # Model exchange
-BEGINNING = 2  # mode of a slip that begins
+BEGINNING, RESTING = 2, 3  # phases of a slip; its mode at trial points, with a sign
 GROWTH = 10.0  # of the slip since the last event: the solver restarts
+GROWTH_ERROR = 1e-6  # by which the solver may find that event early
 BEGINNING_SHARE = 1e-3  # of the nominal slip: up to this size the slip has the direction of its load
 FOLLOWED_SHARE = 0.1  # of the slip at the last evaluation of rates; a smaller one at an event has passed zero in a step
+APPROACH_SIZE, TURNED_FACTOR = 1e-6, 3.0  # of the slip: it may rest; of this, a larger one has turned by a right angle
+END_SHARE = 1e-7  # of the slip where it begins to fall along a straight line: there it rests
+CLEAR_SHARE = 1.0 - 1e-6  # of the friction, below which a load brings the body to rest
 REST_SHARE = 1e-10  # of the largest slip since the last event; a smaller one that has passed zero rests
 TINY = 1e-300  # avoids a division by zero
 TIME_RESOLUTION = 64.0 * EPSILON  # share of the time since the start; shorter steps stall
@@ -57,11 +61,16 @@ class PlanarFriction(CoupledFriction):
     smallest: ContactVector
     largest: ContactVector
     trial: ContactVector  # its size at the last evaluation of rates
+    approach: ContactVector  # its size from which on it may come to rest
+    unit_slip: ContactVector  # its size after the last event, of which the event indicator is a multiple
+    slip_phase: ContactVector  # STUCK, FORWARD, BEGINNING, RESTING
 
     def __init__(self):
         super().__init__()
         self.run_tolerance = 0.0
-        self.last_x = self.last_y = self.smallest = self.largest = self.trial = 0.0
+        self.last_x = self.last_y = self.smallest = self.largest = self.trial = self.approach = 0.0
+        self.unit_slip = 1.0
+        self.slip_phase = STUCK
 
     def planar_motion(
         self, t: float, y: StateVector, modes: ContactVector
@@ -69,21 +78,36 @@ class PlanarFriction(CoupledFriction):
         """Return both components of the slips, those of their rates without friction, and the rate by friction."""
 
 
-def slip_direction(slip, other_slip, load, other_load, mode):
-    """Return one component of the direction of the friction: that of the slip, and where nothing slips, of the load."""
+def slip_direction(slip, other_slip, load, other_load, slide, mode):
+    """Return one component of the direction of the friction: that of the slip, and where nothing slips, of the load.
+
+    A slip in the phase RESTING falls along a straight line, for as long as friction needs to stop it.  No direction of
+    friction with the force `slide` does that; so the size of this one is less than 1.
+    """
     size = sqrt(slip * slip + other_slip * other_slip)
-    if size > 0.0 and mode * mode == 1:
-        return mode * slip / size
-    size = sqrt(load * load + other_load * other_load)
-    return load / size if size > 0.0 else 0.0
+    if size == 0.0 or mode == STUCK or mode == BEGINNING:
+        size = sqrt(load * load + other_load * other_load)
+        return load / size if size > 0.0 else 0.0
+    if slide > 0.0 and mode * mode == RESTING * RESTING:
+        excess = slide * slide - load * load - other_load * other_load
+        power = slip * load + other_slip * other_load
+        return (load + mode * slip * excess / (RESTING * size * slide + mode * power)) / slide
+    return slip / size if mode > 0 else -slip / size
 
 
-def slip_turn(slip, other_slip, change, other_change, mode):
+def slip_turn(slip, other_slip, load, other_load, slide, mode, change, other_change):
     """Return the change of one component of the direction of the friction by the slip."""
     size = sqrt(slip * slip + other_slip * other_slip)
-    if size > 0.0 and mode * mode == 1:
-        return mode * other_slip / size * (other_slip / size * change - slip / size * other_change) / size
-    return 0.0
+    if size == 0.0 or mode == STUCK or mode == BEGINNING:
+        return 0.0
+    turn = other_slip / size * (other_slip / size * change - slip / size * other_change) / size
+    if slide > 0.0 and mode * mode == RESTING * RESTING:
+        excess = slide * slide - load * load - other_load * other_load
+        rest = RESTING * size * slide + mode * (slip * load + other_slip * other_load)
+        size_change = (slip * change + other_slip * other_change) / size
+        rest_change = RESTING * size_change * slide + mode * (change * load + other_change * other_load)
+        return mode * excess / slide * (change - slip * rest_change / rest) / rest
+    return turn if mode > 0 else -turn
 
 
 def slips_freely(model, step, modes: ContactVector, i: ContactIndex):
@@ -197,22 +221,23 @@ def time_to_rest(model, step, i: ContactIndex):
 
 # ---- model exchange
 #
-# The motion must be smooth between events.  The indicator `progress` falls to zero where the slip passes zero; at trial
-# points beyond, friction keeps its direction: mode BACKWARD.  A slip that begins has the direction of its load while it
-# is small: mode BEGINNING.  Friction turns a small slip fast, and implicit solvers keep a Jacobian for many steps: that
-# of a much smaller slip hides errors from them.  So they restart where the slip has grown by GROWTH.
+# The motion must be smooth between events.  The indicator is `progress`, the slip in its direction at the last
+# completed step.  Where it is small and the load below the friction, the phase RESTING begins: the slip falls along a
+# straight line in the time that the closed form gives.  At trial points beyond zero, friction keeps its direction:
+# the mode is negative.  A slip that begins has the direction of its load while it is small: phase BEGINNING.
+# Friction turns a small slip fast, and implicit solvers keep a Jacobian for many steps: that of a much smaller slip
+# hides errors from them.  So they restart where the slip has grown by GROWTH.
 
 
 def progress(model, t, y: StateVector, i: ContactIndex):
-    """Return the slip along its direction at the last completed step."""
+    """Return the slip in its direction at the last completed step."""
     x, other = slip_components(model, t, y, i)
     return x * model.last_x[i] + other * model.last_y[i]
 
 
 def growth_left(model, t, y: StateVector, i: ContactIndex):
     """Return the share by which the slip may grow until the solver of the importer must restart."""
-    x, other = slip_components(model, t, y, i)
-    return 1.0 - sqrt(x * x + other * other) / (GROWTH * model.smallest[i] + TINY)
+    return 1.0 - progress(model, t, y, i) / (GROWTH * model.smallest[i] + TINY)
 
 
 def slip_components(model, t, y: StateVector, i: ContactIndex):
@@ -226,9 +251,10 @@ def slip_components(model, t, y: StateVector, i: ContactIndex):
 
 def trial_mode(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
     """Return the mode at a point that the solver of the importer tries."""
-    if modes[i] == STUCK or modes[i] == BEGINNING:
-        return modes[i]
-    return BACKWARD if progress(model, t, y, i) < 0.0 else FORWARD
+    if modes[i] == STUCK:
+        return STUCK
+    phase = model.slip_phase[i] if model.slip_phase[i] != STUCK else FORWARD
+    return -phase if phase != BEGINNING and progress(model, t, y, i) < 0.0 else phase
 
 
 def note_trial(model, t, y: StateVector, i: ContactIndex):
@@ -238,30 +264,47 @@ def note_trial(model, t, y: StateVector, i: ContactIndex):
 
 
 def complete_step(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
-    """Note direction and size of the slip at a completed step, unless the slip has passed zero."""
+    """Note direction and size of the slip at a completed step, unless an event follows."""
     x, other = slip_components(model, t, y, i)
     size = sqrt(x * x + other * other)
-    if (modes[i] == FORWARD or modes[i] == BACKWARD) and progress(model, t, y, i) > 0.0:
+    if modes[i] != STUCK and model.slip_phase[i] == FORWARD and progress(model, t, y, i) > model.approach[i]:
         model.last_x[i], model.last_y[i] = x / size, other / size
         model.largest[i] = size if size > model.largest[i] else model.largest[i]
         model.smallest[i] = size if size < model.smallest[i] else model.smallest[i]
+        if model.approach[i] > 0.0:
+            model.approach[i] = APPROACH_SIZE * model.largest[i]
 
 
-def stop_passing(model, step, t, y: StateVector, modes: ContactVector, i: ContactIndex) -> StateVector:
-    """Return the states at an event, without a slip that has passed zero but for errors of the importer's solver.
+def is_due(model, t, y: StateVector, i: ContactIndex):
+    """Return whether the slip has come near zero, or turned by a right angle, since the last event."""
+    return model.slip_phase[i] != STUCK and progress(model, t, y, i) <= model.approach[i]
 
-    Else the slip has turned by a right angle, in steps that follow it.
-    """
-    if modes[i] == STUCK or progress(model, t, y, i) > 0.0:
-        return y
+
+def is_near_zero(model, step, t, y: StateVector, i: ContactIndex):
+    """Return whether a slip that is due is small, or has passed zero in a step; else it has turned."""
     slips = model.slip_velocities(t, y)
     floors = contact_lcp.slip_floors(model, step, t, y)
     least = model.largest[i] + floors[i]
-    is_followed = slips[i] > step.tolerance * least or (
-        slips[i] > FOLLOWED_SHARE * model.trial[i] and slips[i] > REST_SHARE * least
-    )
-    if is_followed:
+    if slips[i] > step.tolerance * least and slips[i] > TURNED_FACTOR * model.approach[i]:
+        return False
+    is_small = slips[i] <= TURNED_FACTOR * model.approach[i] or slips[i] <= REST_SHARE * least
+    return is_small or slips[i] <= FOLLOWED_SHARE * model.trial[i]
+
+
+def can_rest(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+    """Return whether the load is clearly below the friction."""
+    _x, _y, load_x, load_y, friction = model.planar_motion(t, y, modes)
+    return sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i]) < CLEAR_SHARE * friction[i]
+
+
+def stop_passing(model, step, t, y: StateVector, modes: ContactVector, i: ContactIndex) -> StateVector:
+    """Return the states at an event, without a slip that has passed zero but for errors of the importer's solver."""
+    if modes[i] == STUCK or not is_due(model, t, y, i):
         return y
+    if model.slip_phase[i] == FORWARD:
+        has_passed = progress(model, t, y, i) <= 0.0 and is_near_zero(model, step, t, y, i)
+        if not has_passed or can_rest(model, t, y, modes, i):
+            return y
     held_modes = contact_vector()
     for j in contact_indices:
         held_modes[j] = FORWARD
@@ -270,12 +313,26 @@ def stop_passing(model, step, t, y: StateVector, modes: ContactVector, i: Contac
 
 
 def begin_phase(model, step, t, y: StateVector, modes: ContactVector, i: ContactIndex):
-    """Note direction and size of the slip after an event.  Returns the mode of the contact."""
+    """Begin a phase of the slip after an event, if there is a reason.  Returns whether the solver restarts."""
+    if modes[i] == STUCK:
+        model.slip_phase[i] = STUCK
+        return False
+    due = is_due(model, t, y, i)
+    if model.slip_phase[i] != STUCK and not due and growth_left(model, t, y, i) > GROWTH_ERROR:
+        return False
+    is_near = due and model.slip_phase[i] == FORWARD and is_near_zero(model, step, t, y, i)
     x, other, load_x, load_y, _friction = model.planar_motion(t, y, modes)
     floors = contact_lcp.slip_floors(model, step, t, y)
-    size, first = sqrt(x[i] * x[i] + other[i] * other[i]), BEGINNING_SHARE * floors[i]
-    model.last_x[i] = slip_direction(x[i], other[i], load_x[i], load_y[i], modes[i])
-    model.last_y[i] = slip_direction(other[i], x[i], load_y[i], load_x[i], modes[i])
-    model.largest[i] = model.trial[i] = size
-    model.smallest[i] = size if size > 0.0 else first / GROWTH
-    return BEGINNING if modes[i] != STUCK and size == 0.0 else modes[i]
+    size = sqrt(x[i] * x[i] + other[i] * other[i])
+    model.last_x[i] = slip_direction(x[i], other[i], load_x[i], load_y[i], 0.0, modes[i])
+    model.last_y[i] = slip_direction(other[i], x[i], load_y[i], load_x[i], 0.0, modes[i])
+    model.largest[i] = model.trial[i] = model.smallest[i] = size
+    model.slip_phase[i], model.approach[i], model.unit_slip[i] = FORWARD, 0.0, size
+    if size == 0.0:
+        model.slip_phase[i], model.unit_slip[i] = BEGINNING, BEGINNING_SHARE * floors[i]
+        model.smallest[i] = model.unit_slip[i] / GROWTH
+    elif not is_near:
+        model.approach[i] = APPROACH_SIZE * size
+    elif can_rest(model, t, y, modes, i):
+        model.slip_phase[i], model.approach[i] = RESTING, END_SHARE * size
+    return True

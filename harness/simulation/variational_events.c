@@ -10,6 +10,8 @@ static const double SHIFT = 1e-3;      /* of the states or a parameter, for diff
 static const double JUMP_SHIFT = 1e-4; /* the same for differences of the states after an event */
 static const double SAME = 1e-5;       /* relative difference of derivatives that are the same */
 static const double RESET = 100.0; /* in tolerances: smaller changes of the states at an event are errors of integration */
+/* Shares of the largest change of a rate at an event: of one that changes; of a derivative, which is an error then */
+static const double CHANGED = 1e-6, CANCELLED = 1e-5;
 static const double SMALLEST = 1e-6; /* of the nominal value: usual size of a state */
 
 typedef struct {
@@ -379,11 +381,15 @@ static int64_t row_at_present(const Run *run)
 /* Update the derivatives of the states after an event: their change, and that by the derivatives of the event time. */
 static void update_slopes(Run *run, const double *moved, const double *slopes, const double *rates, const double *new_rates)
 {
+    double largest = 0.0;
+    for (size_t j = 0; j < run->n; j++) largest = fmax(largest, fabs(rates[j] - new_rates[j]));
     for (size_t i = 0; i < run->m; i++)
         for (size_t j = 0; j < run->n; j++) {
-            double *slope = run->z + run->n * (1 + i) + j;
-            *slope = moved ? moved[i * run->n + j] - slopes[i] * new_rates[j]
-                           : *slope + slopes[i] * (rates[j] - new_rates[j]);
+            double *slope = run->z + run->n * (1 + i) + j, change = rates[j] - new_rates[j];
+            *slope = moved ? moved[i * run->n + j] - slopes[i] * new_rates[j] : *slope + slopes[i] * change;
+            /* what is left of a speed at rest is an error, and would decide on modes at the next break-away */
+            bool is_speed = fabs(change) >= CHANGED * largest && fabs(new_rates[j]) <= CANCELLED * fabs(rates[j]);
+            if (is_speed && fabs(*slope) <= CANCELLED * fabs(slopes[i]) * largest) *slope = 0.0;
         }
 }
 

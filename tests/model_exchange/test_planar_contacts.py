@@ -2,11 +2,13 @@
 
 from math import cos, hypot, pi, radians, sin
 
+import mpmath
 import pytest
 from build_cache import build_once, build_user_model
 from native_fmus import require_compiler
 from variants import slow_after
 
+import harness
 from benchmarks.campaigns import planar_contacts
 from benchmarks.references.plane import rest
 
@@ -73,3 +75,39 @@ def test_cvode_follows_springs_circles_and_jumps_as_co_simulation_does(rtol, tmp
     fmu = next(build_user_model(tmp_path / "driven.py", "--native", *PLATFORM).rglob("driven.fmu"))
     for seed in range(20):
         assert planar_contacts.compare_exchange(fmu, planar_contacts.random_driven(seed), rtol) == "", seed
+
+
+@pytest.mark.parametrize(("F_x", "F_y"), slow_after(1, [(0.3, -1.5), (1.0, 0.2), (0.05, 0.1)]))
+def test_derivatives_of_the_time_of_rest_are_those_of_the_closed_form(puck, F_x, F_y):
+    values = {"m": 1.3, "mu": 2.0, "v_x0": 0.3, "v_y0": 1.0, "F_x": F_x, "F_y": F_y}
+    run = harness.sensitivity(puck, list(values), {"alpha": 0.0, "g": 1.0, "mu_s": 2.0} | values, stop=2.0)
+
+    def time(**changed):
+        m, mu, v_x, v_y, F_x, F_y = (values | changed).values()
+        return m * (mu * m * mpmath.hypot(v_x, v_y) + F_x * v_x + F_y * v_y) / ((mu * m) ** 2 - F_x**2 - F_y**2)
+
+    (event,) = run.events
+    for name, value in values.items():
+        exact = float(mpmath.diff(lambda p, name=name: time(**{name: p}), value))
+        assert event.derivatives[name] == pytest.approx(exact, rel=1e-7), name
+        assert run["v_x", name][-1] == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [18, 27])
+def test_derivatives_through_stick_and_slip_are_those_of_differences(seed, tmp_path):
+    require_compiler()
+    (tmp_path / "driven.py").write_text(planar_contacts.MODEL)
+    fmu = next(build_user_model(tmp_path / "driven.py", "--native", *PLATFORM).rglob("driven.fmu"))
+    values = planar_contacts.random_driven(seed).values | {"r": 0.05, "pull": 0.2}
+    names = ["m", "f", "hold", "k_x", "pull", "r", "Omega"]
+    run = harness.sensitivity(fmu, names, values, stop=4.0, outputs=["x", "y"])
+    assert len(run.events) == 5
+    for name in names:
+        h, ends = 1e-4 * values[name], []
+        for n in (-2, -1, 1, 2):
+            moved = harness.simulate(fmu, values | {name: values[name] + n * h}, stop=4.0, rtol=1e-11)
+            ends.append((moved["x"][-1], moved["y"][-1]))
+        exact = [(a - 8.0 * b + 8.0 * c - d) / (12.0 * h) for a, b, c, d in zip(*ends, strict=True)]
+        actual = [run[output, name][-1] for output in ("x", "y")]
+        assert actual == pytest.approx(exact, rel=1e-5, abs=1e-5 * max(map(abs, exact))), name

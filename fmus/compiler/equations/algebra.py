@@ -259,7 +259,7 @@ def differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
         case "slip_direction":
             changes = slope(a), slope(e.args[1])
             is_constant_direction = all(is_constant(change, 0.0) for change in changes)
-            return 0.0 if is_constant_direction else Term("slip_turn", a, e.args[1], *changes, b)
+            return 0.0 if is_constant_direction else Term("slip_turn", *e.args, *changes)
     if e.op in COMPARISONS:
         raise ModelError("a comparison has no derivative", e.location)
     return _apply_chain_rule(FUNCTIONS[e.op](a, e), slope(a))

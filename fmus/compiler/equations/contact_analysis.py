@@ -138,11 +138,11 @@ class ContactAnalysis(ModelRoles):
         (x, y), (load_x, load_y), total, held = c.slips, loads, 0.0, 0.0
         is_stuck = Term("==", c.mode, 0)
         for force, *pair in (c.x, x, y, load_x, load_y), (c.y, y, x, load_y, load_x):
-            direction = Term("slip_direction", *pair, c.mode)
+            direction = Term("slip_direction", *pair, c.slide, c.mode)
             force.expression = Term("choose", is_stuck, pair[2], build_term("*", c.slide, direction))
             total = build_term("+", total, build_term("*", pair[2], direction))
             # at rest, on a belt, the slip has rounding errors
-            of_load = Term("slip_direction", 0.0, 0.0, *pair[2:], c.mode)
+            of_load = Term("slip_direction", 0.0, 0.0, *pair[2:], c.slide, c.mode)
             held = build_term("+", held, build_term("*", pair[2], of_load))
         self.load[c], self.A[c, c] = held, inverse_mass
         self.slip_rate[c] = build_term("*", inverse_mass, build_term("-", total, c))

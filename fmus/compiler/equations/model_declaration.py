@@ -391,8 +391,8 @@ class PlanarContact(Contact):
         self.x, self.y = (Output(unit, f"{text}, component along {axis}", 0.0) for axis in ("x", "y"))
         self.own_variables = (("_x", ".x", self.x), ("_y", ".y", self.y))
         self.direction = (
-            Term("slip_direction", x, y, self.x, self.y, mode),
-            Term("slip_direction", y, x, self.y, self.x, mode),
+            Term("slip_direction", x, y, self.x, self.y, 0.0, mode),
+            Term("slip_direction", y, x, self.y, self.x, 0.0, mode),
         )
 
     @property
