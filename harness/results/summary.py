@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from html import escape
 from itertools import groupby
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from ..errors import HarnessError, SceneError, by_interface
@@ -240,9 +241,17 @@ class ResultTable:
         table = RichTable(title=self.title or None, title_justify="left", box=SIMPLE_HEAD, show_edge=False)
         table.min_width = len(self.title)
         table.padding, table.caption, table.caption_justify = (0, self.padding, 0, 0), self.note or None, "left"
+        # words may be in several lines, and headings if that is not enough
+        columns = zip(self.columns, zip(self.headings, *self.rows(), strict=True), strict=True)
+        widths = [
+            max(len(word) for cell in cells for word in (cell.split() or [""] if column.is_text else [cell]))
+            for column, cells in columns
+        ]
+        is_wide = sum(widths) + 2 * self.padding * (len(widths) - 1) > get_terminal_size().columns
         for column in self.columns:
+            heading = column.heading.replace(" [", "\n[") if is_wide and not column.is_text else column.heading
             justify = {"no_wrap": column.heading == "unit"} if column.is_text else {"justify": "right", "no_wrap": True}
-            table.add_column(column.heading, overflow="fold", **justify)
+            table.add_column(heading, overflow="fold", **justify)
         for line, rows in self.groups():
             if line:
                 table.add_section()

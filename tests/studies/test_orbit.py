@@ -17,6 +17,7 @@ from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq, minimize_scalar
+from variants import slow_after
 
 import harness
 
@@ -377,6 +378,38 @@ def test_a_forced_oscillator_without_stops_has_the_amplitude_of_den_hartog():
     (point,) = result.points
     assert point.kind == "2 sticks in a period become 0 sticks in a period"
     assert 5.0 < point.value < 7.0
+
+
+def multipliers_without_stops(frequency, m=1.0, k=100.0, force=10.0, friction=6.0):
+    """Return the multipliers of Den Hartog's oscillator, from the closed form of its motion between turning points.
+
+    Where it turns, a small difference of speeds is multiplied by the ratio of the accelerations after and before.
+    """
+    w, largest, half = sqrt(k / m), hartog(frequency, m, k, force, friction), pi / frequency
+    c, s = np.cos(w * half), np.sin(w * half)
+    # x = p cos(frequency t) - q sin(frequency t) + friction/k + a cos(w t) + b sin(w t) from the maximum to the minimum
+    rows = [1, 0, 1, 0], [0, -frequency, 0, w], [-1, 0, c, s], [0, frequency, -w * s, w * c]
+    p, *_ = np.linalg.solve(rows, [largest - friction / k, 0, -largest - friction / k, 0])
+    load = p * (k - m * frequency**2) - k * largest  # force and spring at the maximum
+    jump = np.diag([1.0, (load + friction) / (load - friction)])
+    return np.linalg.eigvals(np.linalg.matrix_power([[c, s / w], [-w * s, c]] @ jump, 2))
+
+
+@pytest.mark.parametrize("frequency", slow_after(1, (7.0, 9.0, 13.0)))
+def test_the_multipliers_without_stops_are_those_of_the_closed_form(frequency):
+    """As S. W. Shaw found: all motions without stops and with damping are stable."""
+    (orbit,) = harness.orbit(native("forced"), {"Omega": frequency}).motions
+    np.testing.assert_allclose(orbit.multipliers, multipliers_without_stops(frequency), rtol=1e-8)
+    assert orbit.stability == "stable"
+
+
+@pytest.mark.slow
+def test_at_half_the_natural_frequency_the_multiplier_is_1_and_the_slow_motion_is_named():
+    """G. Csernak, G. Stepan, S. W. Shaw: marginally stable motions at 1/2n of it."""
+    assert multipliers_without_stops(5.0, friction=2.0).max() == pytest.approx(1.0, abs=1e-14)
+    result = harness.orbit(native("forced"), {"Omega": 5.0, "f": 2.0})
+    assert not result.motions
+    assert "slow to settle" in result.remarks[0]
 
 
 STOPS = {

@@ -115,8 +115,7 @@ class OrbitResult(Result):
         value = ResultColumn(f"{self.parameter} [{self.unit}]", f"{{0[{self.parameter}]:.6g}}")
         return (
             *[value] * bool(self.parameter),
-            ResultColumn("motion", "{0[motion]}", is_text=True),
-            ResultColumn("stability", "{0[stability]}", is_text=True),
+            ResultColumn("motion", lambda row: f"{row['stability']} {row['motion']}".strip(), is_text=True),
             ResultColumn("period [s]", "{0[period]:.8g}"),
             ResultColumn(f"amplitude [{self.coordinate_unit}]", "{0[amplitude]:.6g}"),
             ResultColumn("stick [s]", "{0[stick_time]:.6g}"),
