@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .result import MapResult
 
 COLOURS = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", GREY)
-STRAIGHT = 0.1  # of the axes: neighbouring points of an edge that are farther apart are not joined
+STRAIGHT = 1.5  # cells of the grid: points of an edge that are farther apart are not joined
 
 
 def plot_map(axes: Axes, result: "MapResult") -> None:
@@ -21,9 +21,11 @@ def plot_map(axes: Axes, result: "MapResult") -> None:
     labels = np.array(result.labels)
     for colour, label in zip(COLOURS * len(labels), dict.fromkeys(result.labels), strict=False):
         axes.plot(*flat[labels == label].T, "s", color=colour, alpha=0.35, markersize=3, label=label)
+    cells = np.array([np.ptp(axis) / (len(axis) - 1) for axis in result.axes] + [0.0])[:2]
     for name in dict.fromkeys(edge.name for edge in result.edges):
         edge = np.array([(*item.point, 0.0)[:2] for item in result.edges if item.name == name])
-        axes.plot(*join_points(edge, np.ptp(flat, axis=0)).T, "-|k" if len(result.axes) == 1 else "-k", linewidth=1.2)
+        style = "-|k" if len(result.axes) == 1 else ".-k"
+        axes.plot(*join_points(edge, cells).T, style, linewidth=1.2, markersize=6 if len(result.axes) == 1 else 2)
     units = [*result.units.items(), ("", "")]
     axes.set_xlabel(axis_label(*units[0]))
     if len(result.axes) == 1:
@@ -33,9 +35,9 @@ def plot_map(axes: Axes, result: "MapResult") -> None:
     axes.legend(**LEGEND_ABOVE, ncols=2)
 
 
-def join_points(points: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+def join_points(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return points (n, 2) in the order of a walk from an end to the nearest one; a row of NaN where that is far."""
-    scaled = points / np.where(ranges > 0.0, ranges, 1.0)
+    scaled = points / np.where(cells > 0.0, cells, 1.0)
     left, order = {*range(len(points))}, [int(np.argmax(np.hypot(*(scaled - scaled.mean(axis=0)).T)))]
     left.remove(order[0])
     walk = [points[order[0]]]
