@@ -42,7 +42,7 @@ class LowSpeedRise:
     size : float
         Friction at standstill less that at high speed, over stiffness.
     losses : dict
-        Ranges of the losses by name, with a rise of this size to the end of its interval, for all speeds that fit.
+        Ranges of the losses by name, with a rise of this size up to the end of its interval, for all speeds shown.
     is_shown : bool
         Whether the record shows the rise; without friction at high speed it would be no rise.
     limit : float
@@ -58,7 +58,7 @@ class LowSpeedRise:
 
 @dataclass(frozen=True)
 class Dependences:
-    """On what the residuals depend, and the covariance that it adds.
+    """On what the residuals depend, and the variances that this adds.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
 def noise_variance(e: np.ndarray, width: int, freedom: int) -> float:
     """Return the variance of residuals e (n,), or of their sums over `width` samples if these exceed white noise."""
     sums = np.add.reduceat(e, np.arange(0, len(e), width))
-    return max(float(e @ e), float(sums @ sums) / width * len(e) / (len(sums) * width)) / max(freedom, 1)
+    return max(float(e @ e), float(sums @ sums) / width) / max(freedom, 1)
 
 
 def coefficient_error(column: np.ndarray, e: np.ndarray, basis: np.ndarray) -> float:

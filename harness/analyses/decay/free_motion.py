@@ -90,6 +90,7 @@ def select_free_motion(record: Motion, extrema: Extrema, terms: Terms, pendulum:
         truncate_at_stop,
         remove_outliers,
         skip_disturbed_start,
+        skip_disturbed_turns,
         truncate_at_disturbance,
         estimate_final_noise,
     ):
@@ -121,16 +122,12 @@ def skip_before_start(motion: FreeMotion) -> FreeMotion:
     return replace(motion, available=released, problem=released)
 
 
-def fit_certain_samples(motion: FreeMotion) -> FreeMotion:
-    """Fit the samples up to the last turning point."""
-    return motion.search(select_certain_samples(motion))
-
-
-def select_certain_samples(motion: FreeMotion) -> DecayProblem:
-    """Return the samples up to the last turning point."""
+def fit_certain_samples(motion: FreeMotion, has_search: bool = True) -> FreeMotion:
+    """Fit the samples up to the last turning point, with a search if the fit leaves more than noise."""
     problem, extrema = motion.available, motion.extrema
     last = extrema.t[-1] - problem.time_origin + thresholds.CERTAIN_TIME * extrema.half_period
-    return problem.subset(problem.t <= last)
+    certain = problem.subset(problem.t <= last)
+    return motion.search(certain) if has_search else motion.fit(certain)
 
 
 def truncate_at_stop(motion: FreeMotion) -> FreeMotion:
@@ -170,16 +167,34 @@ def remove_outliers(motion: FreeMotion) -> FreeMotion:
 
 
 def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
-    """Start at the first or the second turning point if a motion before it that is not free bends the fit."""
-    problem, extrema, record, e = motion.problem, motion.extrema, motion.record, motion.residuals()
+    """Start at the first turning point if the half cycle before it is not a free motion."""
+    problem, e = motion.problem, motion.residuals()
     _, starts = problem.half_cycles(motion.p, max_count=1)
-    first, mean_square = problem.t < starts[-1], motion.sum_of_squares / len(e)
-    limit = (thresholds.DISTURBED * max(problem.noise, problem.residual_floor)) ** 2
-    is_bent = mean_square > limit
-    if not is_bent and first.any() and not first.all():
-        rest = float(np.mean(e[~first] ** 2))
-        is_bent = float(np.mean(e[first] ** 2)) > max(limit, thresholds.DISTURBED**2 * rest)
-    for count in (1, 2) if is_bent else ():
+    first = problem.t < starts[-1]
+    if len(starts) < 2 or not 3 <= first.sum() < len(e) - 12:
+        return motion
+    rest = float(np.sqrt(np.mean(e[~first] ** 2)))
+    expected_rms = max(problem.noise, rest, problem.residual_floor)
+    if not np.sqrt(np.mean(e[first] ** 2)) > thresholds.DISTURBED_START * expected_rms:
+        return motion
+    later, p = problem.skip_half_cycles(motion.p, 1)
+    later = later.subset(~first)
+    undisturbed = motion.search(later, p)
+    if undisturbed.sum_of_squares / len(later.t) >= thresholds.BETTER_START * motion.sum_of_squares / len(e):
+        return motion
+    undisturbed = truncate_at_stop(replace(undisturbed, available=later))
+    return undisturbed.add_note(
+        f"The motion is free from t = {motion.format_time(later.t[0])} s on; earlier samples are left out."
+    )
+
+
+def skip_disturbed_turns(motion: FreeMotion) -> FreeMotion:
+    """Start at the first or the second turning point if a motion before it that is not free bends the whole fit."""
+    problem, extrema, record = motion.problem, motion.extrema, motion.record
+    mean_square = motion.sum_of_squares / len(problem.t)
+    if mean_square <= (thresholds.DISTURBED * max(problem.noise, problem.residual_floor)) ** 2:
+        return motion
+    for count in (1, 2):
         if len(extrema.t) < thresholds.MIN_UNDISTURBED + count:
             break
         begin = float(extrema.t[count - 1])
@@ -187,11 +202,11 @@ def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
         available, p = initial_problem(record, later, motion.terms, problem.model.is_pendulum, problem.drift)
         available = available.subset(available.t >= begin - available.time_origin)
         undisturbed = replace(motion, extrema=later, available=available, problem=available, p=p)
-        undisturbed = undisturbed.fit(select_certain_samples(undisturbed))
-        undisturbed = remove_outliers(truncate_at_stop(undisturbed))
+        undisturbed = remove_outliers(truncate_at_stop(fit_certain_samples(undisturbed, has_search=False)))
         share = undisturbed.sum_of_squares / len(undisturbed.problem.t) * (available.scale / problem.scale) ** 2
         if share < thresholds.BETTER_START * mean_square:
-            return undisturbed.add_note(
+            notes = [note for note in motion.notes if not note.startswith("The motion is free from")]
+            return replace(undisturbed, notes=tuple(notes)).add_note(
                 f"The motion is free from t = {motion.format_time(begin - problem.time_origin)} s on; earlier samples "
                 "are left out."
             )

@@ -40,7 +40,16 @@ from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, OMEGA, REST, TERMS, EnergyLoss, Terms, loss_fractions
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import ambiguity_remark, check_fit, is_unreliable, make_remarks, rise_remark
-from .samples import Extrema, block_size, estimate_noise, find_extrema, remove_spikes, thin, thinning_error
+from .samples import (
+    Extrema,
+    block_size,
+    estimate_noise,
+    find_extrema,
+    find_reversals_above_noise,
+    remove_spikes,
+    thin,
+    thinning_error,
+)
 from .window import select_decay
 
 
@@ -213,8 +222,7 @@ def suggest_remedy(record: Motion, parameters: KnownParameters, drag: bool, drif
             "beyond 90 degrees the angular acceleration of a pendulum has two peaks per half cycle: record the angle "
             f"or the angular velocity, or leave out the large amplitudes with {option_text('begin')}"
         )
-    means = [part.mean() for part in np.array_split(record.x, thresholds.DRIFT_PARTS)]
-    if not drift and abs(np.corrcoef(means, range(thresholds.DRIFT_PARTS))[0, 1]) > thresholds.DRIFT_CORRELATION:
+    if not drift and has_drifting_middles(record):
         with suppress(HarnessError):
             with_drift = identify_record(record, parameters, drag, True, lambda share: None)
             total = next(estimate.value for estimate in with_drift.estimates if estimate.name == "drift") * np.ptp(
@@ -224,6 +232,14 @@ def suggest_remedy(record: Motion, parameters: KnownParameters, drag: bool, drif
                 remedy = f"add {option_text('drift', True)}"
                 return f"the rest position drifts by {total:.3g} {record.unit} over the record: {remedy}"
     return ""
+
+
+def has_drifting_middles(record: Motion) -> bool:
+    """Return whether the middles between the reversals of a record follow time."""
+    at = find_reversals_above_noise(record, estimate_noise(record.t, record.x)[0])
+    x = record.x[at]
+    middles = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4
+    return len(middles) > 2 and abs(np.corrcoef(middles, record.t[at[1:-1]])[0, 1]) > thresholds.DRIFT_CORRELATION
 
 
 def identify_record(

@@ -75,17 +75,15 @@ def make_remarks(
             + ("Do not rely on these values." if is_unreliable(problem, uncertainty) else WIDENED)
             + solver
         )
-    elif is_rough and uncertainty.is_correlated:
-        remarks.append(f"{residuals}, while {noise_level}: {disturbed}. {WIDENED}{solver}")
     elif is_rough:
-        remarks.append(f"{residuals}, while {noise_level}: check the time stamps.{solver}")
+        advice = f"{disturbed}. {WIDENED}" if uncertainty.is_correlated else "check the time stamps."
+        remarks.append(f"{residuals}, while {noise_level}: {advice}{solver}")
     elif uncertainty.is_correlated:
         remarks.append(
-            f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. "
-            "The intervals are widened."
+            f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. {WIDENED}"
         )
-    remarks += dependences_remark(problem, uncertainty.dependences.sizes, unit)
-    return (*remarks, *rounding_remark(problem, full, unit))
+    named = dependences_remark(problem, uncertainty.dependences.sizes, unit)
+    return (*remarks, *named, *rounding_remark(problem, full, unit))
 
 
 def dependences_remark(problem: DecayProblem, sizes: dict[str, float], unit: str) -> list[str]:
