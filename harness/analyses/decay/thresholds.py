@@ -44,6 +44,7 @@ LARGE_SWING = 2.0  # rad, amplitude from which on a pendulum swings in no wave
 NO_WAVE = 0.05  # of the power of a cycle
 MANY_SWINGS = 12  # swings that show whether a motion is regular, grows or is constant
 LARGE_PART = 0.5  # of the record: a longer decay needs no other half period
+LARGE_FIRST = 3.0  # times the median swing: a decay from such a swing is not one of many
 SMALL_PART = 0.25  # of the swings: both halves of a shorter decay must be decays
 IRREGULAR = 0.3  # standard deviation of the logarithm of the times between turning points
 SAWTOOTH = 2.0  # ratio of the times of rise and fall

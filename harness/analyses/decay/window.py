@@ -105,10 +105,12 @@ class Decay:
 
     @property
     def is_proven(self) -> bool:
-        """Whether both halves are decays if the decay is the best of many: some swings fall by chance."""
-        middle = (self.first + self.last) // 2
-        is_large = self.count >= thresholds.SMALL_PART * len(self.swings.size)
-        return is_large or (has_loss(self.swings, self.first, middle) and has_loss(self.swings, middle, self.last))
+        """Whether both halves are decays if the decay is one of many like it: some swings fall by chance."""
+        size, middle = self.swings.size, (self.first + self.last) // 2
+        is_large = size[self.first] > thresholds.LARGE_FIRST * float(np.median(size))
+        if is_large or self.count >= thresholds.SMALL_PART * len(size):
+            return True
+        return has_loss(self.swings, self.first, middle) and has_loss(self.swings, middle, self.last)
 
 
 def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float, int]:
