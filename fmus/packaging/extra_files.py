@@ -89,18 +89,25 @@ def model_data(model: type[VariableOwner], declared: Variables, analysis: ModelA
     return (json.dumps(content, indent=1) + "\n").encode()
 
 
-def terminals(declared: Variables) -> dict[str, bytes]:
-    """Return the XML file and its icon by path; empty unless the model has one body and one force or torque input."""
+def terminals(declared: Variables, is_planar: bool = False) -> dict[str, bytes]:
+    """Return the XML file and its icon by path; empty unless the model has one body and one force or torque input.
+
+    A body in a plane has two of each, in this order; the names of their members end in _x and _y.
+    """
     names = {meaning.name: name for name, meaning in declared}
     inputs = [(name, meaning) for name, meaning in declared if meaning.causality == "input"]
     moving = [(name, meaning) for name, meaning in declared if meaning.role == "state" and meaning.rate_of]
-    if len(inputs) != 1 or len(moving) != 1 or inputs[0][1].unit not in FLANGES:
+    axes = ("_x", "_y") if is_planar else ("",)
+    if len(inputs) != len(axes) or len(moving) != len(axes):
         return {}
-    ((force, load),), ((speed, meaning),) = inputs, moving
-    position = names[meaning.rate_of]
-    units, members = FLANGES[load.unit]
-    if (dict(declared)[position].unit, meaning.unit) != units:
-        return {}
+    members: list[tuple[str, str, str]] = []  # name, variable, kind
+    for axis, (force, load), (speed, meaning) in zip(axes, inputs, moving, strict=True):
+        units, labels = FLANGES.get(load.unit, ((), ()))
+        position = names[meaning.rate_of]
+        if (dict(declared)[position].unit, meaning.unit) != units:
+            return {}
+        variables = (position, "signal"), (speed, "signal"), (force, "inflow")
+        members += [(label + axis, *variable) for label, variable in zip(labels, variables, strict=True)]
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = SubElement(root, "GraphicalRepresentation")
     SubElement(graphics, "CoordinateSystem", CORNERS, suggestedScalingFactorTo_mm="0.1")
@@ -111,8 +118,7 @@ def terminals(declared: Variables) -> dict[str, bytes]:
         "description": "the body: its position and speed, and the load on it",
     }
     terminal = SubElement(SubElement(root, "Terminals"), "Terminal", attributes)
-    for member, variable in zip(members, (position, speed, force), strict=True):
-        kind = "inflow" if variable == force else "signal"
+    for member, variable, kind in members:
         SubElement(terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind=kind)
     SubElement(terminal, "TerminalGraphicalRepresentation", FLANGE_CORNERS, iconBaseName=FLANGE_ICON.stem)
     return {

@@ -1,6 +1,8 @@
 """Contacts in a plane in model exchange: solvers of an importer find the rest and the break-away as the closed form."""
 
 from math import cos, hypot, pi, radians, sin
+from xml.etree import ElementTree
+from zipfile import ZipFile
 
 import mpmath
 import pytest
@@ -111,3 +113,13 @@ def test_derivatives_through_stick_and_slip_are_those_of_differences(seed, tmp_p
         exact = [(a - 8.0 * b + 8.0 * c - d) / (12.0 * h) for a, b, c, d in zip(*ends, strict=True)]
         actual = [run[output, name][-1] for output in ("x", "y")]
         assert actual == pytest.approx(exact, rel=1e-5, abs=1e-5 * max(map(abs, exact))), name
+
+
+def test_the_terminal_of_fmi_3_has_both_axes(puck):
+    if "FMI 2.0" in str(puck):
+        pytest.skip("FMI 2.0 has no terminals")
+    with ZipFile(puck) as archive:
+        root = ElementTree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+    members = [(m.get("memberName"), m.get("variableName")) for m in root.iter("TerminalMemberVariable")]
+    along_x = [("position_x", "x"), ("speed_x", "v_x"), ("force_x", "F_x")]
+    assert members == [*along_x, ("position_y", "y"), ("speed_y", "v_y"), ("force_y", "F_y")]

@@ -5,6 +5,7 @@ from math import atan2, cos, hypot, pi, radians, sin
 from shutil import rmtree
 
 import commands
+import fmpy
 import numpy as np
 import pytest
 from build_cache import build_once, build_user_model
@@ -57,6 +58,26 @@ BLOCK = """    k_b = Parameter(100.0, "N/m", "stiffness of the spring of a block
     block_mode = Mode()
     B = Contact("N", "friction of the block", mode=block_mode, slip=w, slide=f, hold=f_s)
     b = Output("m/s2", "acceleration of the block", (-k_b * z - B) / m, rate_of=w)
+"""
+
+SPIN = {
+    "slip": "(v_x - arm * spin, v_y)",
+    "belt": """    arm = Parameter(0.1, "m", "radius")
+    spin = State("rad/s", "spin")
+""",
+    "more": """    turn = Output("rad/s2", "its rate", R.x / (arm * m), rate_of=spin)
+""",
+}
+# a second body in a plane, which only a spring connects with the first
+SECOND = """    k_2 = Parameter(50.0, "N/m", "stiffness of the spring between the bodies")
+    z_x = State("m", "position of the second body along x", start=0.2)
+    z_y = State("m", "position of the second body along y")
+    w_x = State("m/s", "its speed along x", rate_of=z_x)
+    w_y = State("m/s", "its speed along y", rate_of=z_y)
+    second_mode = Mode()
+    S = PlanarContact("N", "friction of the second body", mode=second_mode, slip=(w_x, w_y), slide=f, hold=f_s)
+    b_x = Output("m/s2", "acceleration of the second body along x", (-k_2 * (z_x - x) - S.x) / m, rate_of=w_x)
+    b_y = Output("m/s2", "acceleration of the second body along y", (-k_2 * (z_y - y) - S.y) / m, rate_of=w_y)
 """
 
 
@@ -179,6 +200,36 @@ def test_body_on_a_belt_moves_as_on_a_table_that_stands_still(puck, build):
 
 
 @pytest.mark.slow
+def test_two_bodies_in_a_plane_and_a_block_move_as_they_do_alone(puck, build):
+    """Without the spring between them they are independent; with it, CVode is the second route."""
+    several = build("several", *NATIVE, more=SECOND + BLOCK)
+    start, force = {"v_x0": 0.5, "v_y0": 1.0}, constant(0.5, 0.3, 2.0)
+    alone = harness.simulate(puck, start, stop=2.0, inputs=force, rtol=1e-10)
+    run = harness.simulate(several, start | {"k_2": 0.0}, stop=2.0, inputs=force, rtol=1e-10)
+    assert (run["x"][-1], run["y"][-1]) == pytest.approx((alone["x"][-1], alone["y"][-1]), abs=1e-9)
+    assert run["mode"][-1] == alone["mode"][-1] == 0
+    assert (run["z_x"][-1], run["z_y"][-1], run["second_mode"][-1]) == (0.2, 0.0, 0)
+    start |= {"k_2": 50.0}
+    run = harness.simulate(several, start, stop=2.0, inputs=force, rtol=1e-10)
+    inputs = np.array(list(zip(*force.values(), strict=True)), [(name, float) for name in force])
+    names = ["x", "y", "z_x", "z_y", "z", "mode", "second_mode", "block_mode", "events.count"]
+    other = fmpy.simulate_fmu(
+        several,
+        fmi_type="ModelExchange",
+        start_values=start,
+        input=inputs,
+        stop_time=2.0,
+        relative_tolerance=1e-9,
+        output_interval=0.01,
+        output=names,
+    )[-1]
+    assert run["mode"][-1] == run["second_mode"][-1] == 0
+    for name in names[:8]:
+        assert run[name][-1] == pytest.approx(other[name], abs=1e-7), name
+    assert len(run.events.t[run.events.t > 0.0]) == other["events.count"] > 3
+
+
+@pytest.mark.slow
 def test_python_and_native_fmus_have_the_same_bits(puck, build):
     python = build("puck")
     start, force = {"k": 90.0, "f_s": 2.5, "v_y0": 1.0}, constant(4.0, 1.0, 3.0)
@@ -246,6 +297,9 @@ def test_pulled_body_sticks_and_slips_as_scipy_says(build):
         ({"mass": "(2.0 * m)"}, "R.x and R.y do not accelerate their slips alike"),
         ({"slip": "(v_x * x, v_y)"}, "slip of R must be sums of speeds"),
         ({"slip": "v_x"}, "slip of a PlanarContact must be a pair of speeds"),
+        ({"slip": "(v_x, v_y, v_x)"}, "slip of a PlanarContact must be a pair of speeds"),
+        (SPIN, "R.x and R.y do not accelerate their slips alike"),
+        ({"more": SECOND.replace("slip=(w_x, w_y)", "slip=(w_x - v_x, w_y - v_y)")}, "R and S act on the same motion"),
         ({"more": BLOCK.replace("slip=w", "slip=w - v_x")}, "R and B act on the same motion"),
     ],
 )

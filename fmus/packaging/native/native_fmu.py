@@ -90,7 +90,7 @@ def build(
     declared = declared_variables(cls)
     entries = extra_files(cls, source.path, declared, source.analysis, ICON_PATHS[fmi], USAGE_NOTE)
     if fmi == "3":
-        entries |= terminals(declared)
+        entries |= terminals(declared, bool(source.analysis.planar_contacts))
     entries |= {"modelDescription.xml": description, LICENSE: license_files()[LICENSE]}
     entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
     entries["sources/buildDescription.xml"] = render_build_description(name, fmi)
