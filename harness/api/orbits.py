@@ -17,7 +17,7 @@ from ..arguments import (
     check_arguments,
     mapping,
 )
-from ..errors import SceneError
+from ..errors import SceneError, option_text
 from .options import check_workers, reporter, with_progress_bar
 from .runs import read_input_columns
 
@@ -172,6 +172,11 @@ def map_motions(
 
     axes = expand_axes(over, DEFAULT_GRID, 2)
     check_workers(workers, scheduler)
+    if measure is None and levels is not None:
+        raise SceneError(f"{option_text('levels')} has no effect without {option_text('measure')}: name one")
+    if measure is not None and (section is not None or period is not None):
+        name = option_text("period" if section is None else "section")
+        raise SceneError(f"{name} has no effect with {option_text('measure')}: remove it")
     bounds = () if levels is None else tuple(np.asarray(levels, dtype=float).tolist())
     request = MapRequest(
         resolve_motion(source, values, inputs), tuple(axes), period, section or "", measure or "", bounds

@@ -63,6 +63,8 @@ class SavedStateMotion:
             for name, item in variables.items()
             if item.causality == "output" and item.type in REAL_TYPES and not item.dimensions
         ]
+        if spec.inputs:
+            raise SceneError(f"{spec.fmu.name} is not of this project: returns are counted without inputs; remove them")
         if not section:
             raise SceneError(
                 f"{spec.fmu.name} is not of this project: name a section, one of its outputs, or a measure"

@@ -18,7 +18,7 @@ FUNCTIONS = [getattr(harness, name) for name in harness.__all__ if inspect.isfun
 
 @pytest.fixture(scope="module")
 def help_texts(tmp_path_factory):
-    names = ("run", "sweep", "fit", "decay", "curve", "compare")
+    names = ("run", "sweep", "fit", "decay", "curve", "compare", "map")
     return "".join(commands.harness(tmp_path_factory.mktemp("help"), name, "--help").stdout for name in names)
 
 

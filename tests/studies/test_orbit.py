@@ -271,6 +271,13 @@ def test_the_belt_changes_where_it_should_as_the_speed_grows():
     assert {item.kind for item in result.motions if item.value > ends.value} == {STEADY}
 
 
+def test_the_stick_slip_of_the_belt_is_near_the_start_of_leines_program():
+    """R. I. Leine, run_simulations_block_on_belt.m of a keynote at ENOC 2024, starts it at 1.135 m."""
+    orbit = motion(harness.orbit(native("belt")), STICK_SLIP)
+    assert orbit.largest == pytest.approx(1.13394, abs=5e-6)
+    assert orbit.largest == pytest.approx(1.135, abs=2e-3)
+
+
 def test_a_sled_without_damping_has_the_closed_form_of_stick_slip():
     m, k, mu_s, mu_d, g, speed = 12.5, 742.5, 0.9, 0.6, 9.81, 0.034
     orbit = motion(harness.orbit(native("stickslip")), STICK_SLIP)
@@ -624,6 +631,8 @@ def test_a_map_of_an_fmu_of_another_tool_counts_returns_by_its_saved_states(tmp_
     assert edge.point[0] == pytest.approx(edge_of_stick_slip(0.2), rel=1e-10)
     with pytest.raises(harness.SceneError, match="name a section, one of its outputs, or a measure"):
         harness.map_motions(fmu, over, values)
+    with pytest.raises(harness.SceneError, match="returns are counted without inputs"):
+        harness.map_motions(fmu, over, values, section="v", inputs={"time": [0.0, 1.0], "F_ext": [0.0, 1.0]})
     with pytest.raises(harness.SceneError, match="unknown section 'speed'"):
         harness.map_motions(fmu, over, values, section="speed")
     without = {"modelDescription.xml": lambda text: re.sub(r'can\w+FMUstate="true"', "", text)}
@@ -646,6 +655,13 @@ def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
     for edge, number in zip(result.edges, (3, 4, 5), strict=True):
         exact = brentq(lambda mu_d, n=number: start_of_slip(mu_d, n) - stop, 0.3, 0.8, xtol=1e-15)
         assert edge.point[0] == pytest.approx(exact, rel=1e-11)
+    for options, message in (
+        ({"levels": [1.0]}, "`levels` has no effect without `measure`"),
+        ({"measure": "slips", "section": "v"}, "`section` has no effect with `measure`"),
+        ({"measure": "speed"}, "unknown measure of stickslip 'speed'"),
+    ):
+        with pytest.raises(harness.SceneError, match=message):
+            harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.7]}, **options)
     with pytest.raises(harness.SceneError, match="is not a whole number: give the levels"):
         harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.7]}, measure="peak_speed")
     levels = harness.map_motions(
