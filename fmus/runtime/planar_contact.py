@@ -31,6 +31,7 @@ from .vectors import (
 
 # Of the time in which the present rate would remove the slip, or has built it up
 APPROACH_SHARE, GROWTH_SHARE = 0.75, 3.0
+GRADUAL, GRADUAL_SHARE = 1.0 + 1e-4, 1e-3  # of the friction, for a load whose excess grows from zero; of the first step
 FIRST_SHARE = 1e-12  # of the first step after a break-away: duration after which the slip begins with a direction
 ROUNDING_SHARE = 1e-12  # of the largest slip since the last event; a smaller one is a rounding error
 ERROR_SHARE = 1e-3  # of the slip, by which errors may change it in a step
@@ -137,10 +138,37 @@ def begin_slip(model, step, i: ContactIndex) -> StateVector:
     The slip of a moment later is below all errors.
     """
     states, modes = step.y1, step.modes1
-    x, y, _load_x, _load_y, _friction = model.planar_motion(step.t1, states, modes)
+    x, y, load_x, load_y, friction = model.planar_motion(step.t1, states, modes)
+    load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
+    if modes[i] != STUCK and x[i] == 0.0 and y[i] == 0.0 and load < GRADUAL * friction[i]:
+        return begin_gradually(model, step, states, modes, load - friction[i], i)
     duration = FIRST_SHARE * step.h_next if modes[i] != STUCK and x[i] == 0.0 and y[i] == 0.0 else 0.0
     f = model.rates(step.t1 + duration, states, modes)
     return select_kinematic(states, states + duration * f)
+
+
+def begin_gradually(model, step, states: StateVector, modes: ContactVector, excess, i: ContactIndex) -> StateVector:
+    """Return the states after a break-away with a small excess of the load over the friction.
+
+    An excess that grows from zero moves the slip with the square of the time: half of its growth in a short time acts
+    during that time.
+    """
+    held_modes, stuck_modes = contact_vector(), contact_vector()
+    for j in contact_indices:
+        held_modes[j], stuck_modes[j] = FORWARD, modes[j]
+    held_modes[i] = stuck_modes[i] = STUCK
+    duration = GRADUAL_SHARE * step.h_next
+    t = step.t1 + duration
+    f = model.rates(step.t1, states, stuck_modes)
+    y2 = states + duration * f
+    y3 = contact_lcp.stop_slips(model, t, y2, held_modes)
+    _x, _y, load_x, load_y, friction = model.planar_motion(t, y3, modes)
+    later = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i]) - friction[i]
+    growth = (later - excess) / later if later > excess and later > 0.0 else 0.0
+    f2 = model.rates(t, y3, stuck_modes)
+    f3 = model.rates(t, y3, modes)
+    change = f3 - f2
+    return states + (0.5 * growth * duration + FIRST_SHARE * step.h_next) * change
 
 
 def tighten_tolerance(model, step, modes: ContactVector, i: ContactIndex):

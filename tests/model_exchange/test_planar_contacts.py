@@ -70,6 +70,22 @@ def test_a_body_holds_up_to_a_circle_and_leaves_along_its_load(puck, degrees):
 
 
 @pytest.mark.slow
+def test_a_body_leaves_under_a_load_that_turns_where_holding_and_sliding_friction_are_equal(tmp_path):
+    """Its slip begins without acceleration."""
+    require_compiler()
+    (tmp_path / "driven.py").write_text(planar_contacts.MODEL)
+    fmu = next(build_user_model(tmp_path / "driven.py", "--native", *PLATFORM).rglob("driven.fmu"))
+    for seed in range(8):
+        motion = planar_contacts.random_driven(seed)
+        motion.values |= {"hold": motion.values["f"], "v_x0": 0.0, "v_y0": 0.0, "r": 0.08}
+        motion.forces = motion.forces[:1]
+        assert planar_contacts.compare_exchange(fmu, motion, 1e-8) == "", seed
+        for method in ("dop853", "ode23", "rodas"):
+            run = harness.simulate(fmu, motion.values, stop=1.0, rtol=1e-6, method=method)
+            assert len(run.events.t) > 0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 def test_cvode_follows_springs_circles_and_jumps_as_co_simulation_does(rtol, tmp_path):
     require_compiler()
