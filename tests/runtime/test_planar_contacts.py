@@ -161,20 +161,13 @@ def quarter_turns(puck, method):
     ]
 
 
-@pytest.mark.parametrize("method", slow_after(1, ("dop853", "ode23", "ode45")))
+@pytest.mark.parametrize("method", slow_after(2, ("dop853", "radau9", "rodas", "ode23", "ode45")))
 def test_quarter_turn_of_the_plane_changes_no_bit(puck, method):
     run, turned = quarter_turns(puck, method)
     assert run.events.t.tolist() == turned.events.t.tolist()
     assert len(run.events.t) > 1
     assert run["x"].tolist() == turned["y"].tolist()
     assert run["y"].tolist() == (-turned["x"]).tolist()
-
-
-@pytest.mark.parametrize("method", ["radau9", "rodas"])
-def test_quarter_turn_of_the_plane_changes_linear_solutions_within_the_tolerance(puck, method):
-    run, turned = quarter_turns(puck, method)
-    assert run.events.t == pytest.approx(turned.events.t, abs=1e-7)
-    assert (run["x"][-1], run["y"][-1]) == pytest.approx((turned["y"][-1], -turned["x"][-1]), abs=1e-7)
 
 
 @pytest.mark.parametrize("v_belt", [0.171, 3.3, 1000.0])

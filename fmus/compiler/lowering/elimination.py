@@ -8,6 +8,8 @@ from typing import Any
 from ...runtime import linear_solver
 from .layout import STATES, ModelLayout
 
+DECLARED, EXCHANGED = "_declared", "_exchanged"  # suffixes of names of solutions, by the order of the axes
+
 
 class Symbol:
     """An expression in the source; operations build larger ones."""
@@ -100,50 +102,86 @@ def tuple_or_single(terms: list[ast.expr]) -> ast.expr:
 
 
 class LoweredSystem:
-    """The linear system `name` of a model, complex if the shift is: its factorization and solutions, as statements."""
+    """The linear system `name` of a model, complex if the shift is: its factorization and solutions, as statements.
+
+    Rounding errors of an elimination depend on the order of the unknowns. With contacts in a plane, the solution is the
+    mean of those for both orders of their velocities, so that a quarter turn of the plane changes no bit.
+    """
 
     def __init__(self, name: str, spec: ModelLayout, arguments: Sequence[ast.expr], is_complex: bool) -> None:
         self.spec, self.is_complex = spec, is_complex
         first, second, self.jacobian = arguments
         self.arguments = Symbol(first), Symbol(second)  # g and h, or the parts of the shift
-        self.computed = spec.dynamic_states
-        self.moved = {place: spec.rate_place(place) for place in spec.kinematic_states}
-
-        def entry(place: Any) -> str:
-            return f"{name}_{place}" if isinstance(place, str) else spec.entry_name(name, *place)
-
-        if is_complex:
-            self.entries = NamedEntries(lambda place: f"{entry(place)}_re", lambda place: f"{entry(place)}_im")
-        else:
-            self.entries = NamedEntries(entry)
+        self.orders = [Elimination(name, self, list(range(len(spec.states))))]
+        if spec.axes:
+            self.orders.append(Elimination(f"{name}{EXCHANGED}", self, spec.states_with_exchanged_axes))
 
     def factorize(self) -> list[ast.stmt]:
         """Return the statements that factorize the matrix."""
-        places = [(i, j) for i in self.computed for j in range(len(self.spec.states))]
-        name = ast.unparse(self.jacobian)
-        J = {at: Symbol.named(self.spec.entry_name(name, *at)) for at in places if at not in self.spec.zeros}
-        factorize = linear_solver.factorize_complex if self.is_complex else linear_solver.factorize
-        first, second = self.arguments
-        factorize(self.entries, first, second, J, self.computed, self.moved)
-        return self.entries.statements
+        return [statement for order in self.orders for statement in order.factorize()]
+
+    def component(self, vector: str, place: int) -> str:
+        """Return the name of a component of a vector."""
+        return self.spec.component_name(vector, STATES, place)
 
     def solve(self, results: Sequence[str], right: Sequence[str], known_zeros: Collection[str] = ()) -> list[ast.stmt]:
         """Return the statements that solve for a right-hand side; both are vectors, or the parts of a complex one.
 
         `known_zeros` are names of components that are always zero.
         """
+        given = [i for i in range(len(self.spec.states)) if self.component(right[0], i) not in known_zeros]
+        r = {i: [Symbol.named(self.component(vector, i)) for vector in right] for i in given}
+        if len(self.orders) == 1:
+            return self.orders[0].solve(results, r)
+        vectors = [[f"{name}{suffix}" for name in results] for suffix in (DECLARED, EXCHANGED)]
+        statements = [
+            statement for order, names in zip(self.orders, vectors, strict=True) for statement in order.solve(names, r)
+        ]
+        places = self.spec.dynamic_states if self.is_complex else range(len(self.spec.states))
+        means = NamedEntries(lambda place: self.component(*place))
+        for vector, first, second in zip(results, *vectors, strict=True):
+            for i in places:
+                means[vector, i] = 0.5 * (
+                    Symbol.named(self.component(first, i)) + Symbol.named(self.component(second, i))
+                )
+        return statements + means.statements
 
-        def component(vector: str, place: int) -> str:
-            return self.spec.component_name(vector, STATES, place)
 
-        k = NamedEntries(*(partial(component, vector) for vector in results))
-        given = [i for i in range(len(self.spec.states)) if component(right[0], i) not in known_zeros]
-        r = {i: [Symbol.named(component(vector, i)) for vector in right] for i in given}
-        if self.is_complex:
+class Elimination:
+    """The elimination of a linear system in one order of the states."""
+
+    def __init__(self, name: str, system: LoweredSystem, states: Sequence[int]) -> None:
+        self.system, spec = system, system.spec
+        self.computed = [i for i in states if i in spec.dynamic_states]
+        self.moved = {i: spec.rate_place(i) for i in states if i in spec.kinematic_states}
+
+        def entry(place: Any) -> str:
+            return f"{name}_{place}" if isinstance(place, str) else spec.entry_name(name, *place)
+
+        if system.is_complex:
+            self.entries = NamedEntries(lambda place: f"{entry(place)}_re", lambda place: f"{entry(place)}_im")
+        else:
+            self.entries = NamedEntries(entry)
+
+    def factorize(self) -> list[ast.stmt]:
+        """Return the statements that factorize the matrix."""
+        spec = self.system.spec
+        places = [(i, j) for i in self.computed for j in range(len(spec.states))]
+        name = ast.unparse(self.system.jacobian)
+        J = {at: Symbol.named(spec.entry_name(name, *at)) for at in places if at not in spec.zeros}
+        factorize = linear_solver.factorize_complex if self.system.is_complex else linear_solver.factorize
+        first, second = self.system.arguments
+        factorize(self.entries, first, second, J, self.computed, self.moved)
+        return self.entries.statements
+
+    def solve(self, results: Sequence[str], r: dict[int, list[Symbol]]) -> list[ast.stmt]:
+        """Return the statements that solve for the parts of a right-hand side, by state."""
+        k = NamedEntries(*(partial(self.system.component, vector) for vector in results))
+        if self.system.is_complex:
             parts = {i: linear_solver.Complex(*r[i]) for i in self.computed}
             linear_solver.solve_complex(k, self.entries, parts, self.computed)
         else:
-            numbers = {i: r[i][0] for i in given}
-            g, h = self.arguments
+            numbers = {i: parts[0] for i, parts in r.items()}
+            g, h = self.system.arguments
             linear_solver.solve(k, self.entries, g, h, numbers, self.computed, self.moved)
         return k.statements

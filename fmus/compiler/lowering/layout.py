@@ -28,6 +28,7 @@ class ModelLayout:
                 number of conditions of the equations
     angles      states that are angles and enter the equations by periodic functions only
     planar      modes of the contacts in a plane
+    axes        speeds along the two axes of a plane, in pairs
     """
 
     states: dict[str, str]
@@ -40,6 +41,7 @@ class ModelLayout:
     n_conditions: int = 0
     angles: tuple[str, ...] = ()
     planar: tuple[str, ...] = ()
+    axes: tuple[tuple[str, str], ...] = ()
 
     def component_names(self, kind: str) -> list[str]:
         """Return the names of the states or modes."""
@@ -58,6 +60,15 @@ class ModelLayout:
     def kinematic_states(self) -> list[int]:
         """Indices of states whose rates are states."""
         return [place for place, rate in enumerate(self.states.values()) if rate in self.states]
+
+    @property
+    def states_with_exchanged_axes(self) -> list[int]:
+        """Indices of the states, where those along the two axes of a plane stand in the place of each other."""
+        names = list(self.states)
+        other = dict(self.axes) | {y: x for x, y in self.axes}
+        position = {speed: state for state, speed in self.states.items()}
+        other |= {position[x]: position[y] for x, y in other.items() if x in position and y in position}
+        return [names.index(other.get(name, name)) for name in names]
 
     @property
     def angle_states(self) -> list[int]:

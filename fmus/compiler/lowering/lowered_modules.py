@@ -15,6 +15,9 @@ from typing import TypeGuard
 from ...runtime.oscillator import Oscillator
 from .. import __version__
 from ..equations import model_class
+from ..equations.algebra import variables_in
+from ..equations.expressions import Operand, is_among
+from ..equations.model_analysis import ModelAnalysis
 from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes, replace_fields
 from .feature_selection import EXACT, HYBRID, FeatureSelection
@@ -73,7 +76,15 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     zeros = zero_jacobian_entries(source.generated_source, layout)
     angles = tuple(s.name for s in analysis.angles)
     planar = tuple(c.mode.name for c in analysis.planar_contacts)
-    return replace(layout, zeros=zeros, n_conditions=len(analysis.conditions), angles=angles, planar=planar)
+    slips = ([speeds_in(slip, analysis) for slip in c.slips] for c in analysis.planar_contacts)
+    axes = tuple(pair for x, y in slips for pair in zip(x, y, strict=False))
+    n_conditions = len(analysis.conditions)
+    return replace(layout, zeros=zeros, n_conditions=n_conditions, angles=angles, planar=planar, axes=axes)
+
+
+def speeds_in(slip: Operand, analysis: ModelAnalysis) -> list[str]:
+    """Return the names of the states in a slip, in their order."""
+    return [e.name for e in variables_in(slip) if is_among(e, analysis.states)]
 
 
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:
