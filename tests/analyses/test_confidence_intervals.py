@@ -90,6 +90,7 @@ def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
     problem = SimpleNamespace(
         t=t,
         x=y,
+        scale=1.0,
         model=SimpleNamespace(t_mid=5.0),
         residual_floor=0.0,
         noise=0.0,

@@ -305,14 +305,12 @@ def test_the_methods_preserve_dimensions(physics, name):
     for file in [item for item, number, _ in declared(name)["solver.method"].items if number != EXACT]:
         method = getattr(runtime(name, file), file.capitalize())()
         step = runtime(name, "internal_step").InternalStep(model)
-        x1, v1, a1, e_x, e_v = method.propose(model, step, *modes, t, x, v, a, h)
-        assert [assert_dimension(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [
-            True
-        ] * 5
-        position, speed = model.states
-        for end, values in ("0", (x, v, a)), ("1", (x1, v1, a1)):
-            for vector, state, value in zip("yyf", (position, speed, speed), values, strict=True):
-                setattr(step, component_name(vector + end, state), value)
+        x1, v1, *rates1, e_x, e_v = method.propose(model, step, *modes, t, x, v, v, a, h)
+        ends = (x1, x), (v1, v), *zip(rates1, (v, a), strict=True), (e_x, x / h), (e_v, v / h)
+        assert [assert_dimension(*pair) for pair in ends] == [True] * 6
+        for vector, values in {"y0": (x, v), "f0": (v, a), "y1": (x1, v1), "f1": rates1}.items():
+            for state, value in zip(model.states, values, strict=True):
+                setattr(step, component_name(vector, state), value)
         step.t0, step.modes0_mode, step.h_full = t, 1, h
         method.build_interpolant(model, step)
         assert [assert_dimension(*pair) for pair in zip(step.interpolant.evaluate(0.3 * h), (x, v), strict=True)] == [
