@@ -57,7 +57,8 @@ def test_a_friction_curve_is_that_of_its_file(files, kind):
     assert numbers(identify_curve(KINDS[kind](path))) == numbers(identify_curve(path))
 
 
-@pytest.mark.parametrize("kind", slow_after(1, KINDS))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_fit_is_that_of_its_file(files, kind):
     def fit(record):
         return numbers(

@@ -343,6 +343,7 @@ def test_no_temporary_fmu_files_remain_of_a_failed_run(user_folder, tmp_path):
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     """A slip every two seconds, up to 1e12 s; up to 1e300 s, a slip is too short beside the run."""
     done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e300, "--timeout", 0.5)

@@ -196,6 +196,7 @@ def test_the_error_is_proportional_to_the_tolerance(launch, name):
             assert abs(fmu.get("x") - x) < 30.0 * rtol
 
 
+@pytest.mark.slow
 def test_changes_are_located_to_rounding(launch):
     """Parabolas, which all methods follow exactly, at a loose tolerance: a relay with 800 changes, a force that sets in
     at a time, two conditions at the same instant."""

@@ -16,7 +16,6 @@ from native_fmus import require_compiler
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from variants import slow_after
 from worker_client import FmiError
 
 import harness
@@ -176,7 +175,8 @@ def test_values_are_those_of_numpy_and_scipy_in_each_kind_of_fmu(worker, tmp_pat
 # ---- motions
 
 
-@pytest.mark.parametrize("kind", slow_after(1, KINDS))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_error_is_proportional_to_the_tolerance(worker, tmp_path, kind):
     """Each method, against a solution from one point of the tables to the next: position and changes of the mode."""
     if kind:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from build_cache import ROOT, build_user_model
 from prescribed_motion import solve_block
-from variants import slow_after
 
 import harness
 
@@ -66,7 +65,8 @@ def test_two_equal_masses_converge_to_their_closed_form_in_proportion_to_the_ste
     assert errors[1] < 5e-3
 
 
-@pytest.mark.parametrize("tool", slow_after(1, ["libcosim", "ecos", "omsimulator"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("tool", ["libcosim", "ecos", "omsimulator"])
 def test_another_tool_gives_the_motion_of_the_page(folder, tool):
     if not find_spec({"libcosim": "libcosimpy", "ecos": "ecospy", "omsimulator": "OMSimulator"}[tool]):
         pytest.skip(f"{tool} is not installed")

@@ -13,7 +13,7 @@ from benchmarks.campaigns.random_models import random_structure, random_values, 
 CASES = [(21, RADAU9, 1e-6), (33, DOP853, 1e-11), (21, RADAU9, 1e-11), (33, RADAU9, 1e-11), (34, RADAU9, 1e-6)]
 
 
-@pytest.mark.parametrize(("values", "method", "rtol"), slow_after(2, CASES))
+@pytest.mark.parametrize(("values", "method", "rtol"), slow_after(1, CASES))
 def test_rest_takes_few_steps_and_ends_on_time(worker, tmp_path, values, method, rtol):
     structure = random_structure(13)
     numbers, _ = random_values(structure, values)

@@ -64,7 +64,10 @@ def test_a_proposal_beyond_the_range_of_numbers_shortens_the_step_alike_in_all_u
 
 
 RUNS = [
-    *(("sleds", None, *exponents) for exponents in [(-30, 0, 0), (20, 0, 0), (40, 0, 0), (0, 40, 0), (-40, -20, 40)]),
+    *(
+        pytest.param("sleds", None, *exponents, marks=pytest.mark.slow)
+        for exponents in [(-30, 0, 0), (20, 0, 0), (40, 0, 0), (0, 40, 0), (-40, -20, 40)]
+    ),
     *(("coulomb", method, -30, 0, 0) for method in (None, ODE23, RODAS)),
     *(("pacejka", method, *exponents) for method in (None, ODE23) for exponents in [(-40, 0, 0), (0, 40, 0)]),
     *((name, None, *exponents) for name in ("forced", "stacked") for exponents in [(20, 0, 0), (0, -40, 0)]),

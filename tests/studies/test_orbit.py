@@ -313,11 +313,12 @@ class Clocked(Model):
 '''
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("unit", "rate", "angle", "options"),
     [
         ("s", "1.0", "Omega * clock", {"period": 2 * pi / 7.0}),
-        pytest.param("rad", "Omega", "clock", {}, marks=pytest.mark.slow),
+        ("rad", "Omega", "clock", {}),
     ],
 )
 def test_a_force_by_a_clock_has_the_amplitude_of_den_hartog(unit, rate, angle, options):

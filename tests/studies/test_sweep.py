@@ -170,7 +170,7 @@ REASONS = {  # why some have no run to show
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=() if name in ("Midpoint", "Arrays", *REASONS) else pytest.mark.slow)
+        pytest.param(name, marks=() if name in ("Arrays", *REASONS) else pytest.mark.slow)
         for name in external_fmus.SWEEP_AXES
         if name != "Gain"  # zero without an input
     ],
