@@ -409,8 +409,9 @@ def main():
     parser.add_argument("--method", type=int, default=4, choices=METHODS)
     parser.add_argument("--rtol", type=float, default=1e-6)
     arguments = parser.parse_args()
-    folder = arguments.folder
-    folder.mkdir(parents=True, exist_ok=True)
+    folder, solutions = arguments.folder, arguments.solutions or arguments.folder
+    for path in (folder, solutions):
+        path.mkdir(parents=True, exist_ok=True)
     build_cache.shared_folder = folder.resolve()  # for the temporary files of the worker
     worker = Worker()
     if arguments.show:
@@ -424,7 +425,7 @@ def main():
         structure = random_structure(number)
         paths, failures = build([structure], folder, root=arguments.root)
         for seed in range(arguments.first_values, arguments.first_values + arguments.values):
-            reference = cached_reference(structure, seed, arguments.solutions or folder)
+            reference = cached_reference(structure, seed, solutions)
             slow = ("python", "fmi3") if seed % arguments.bits == 0 else ()
             new, more, worker = run_case(worker, paths, structure, seed, reference, slow_backends=slow)
             failures += new
