@@ -30,6 +30,7 @@ class Mine(Model):
 RATE = '    a = Output("m/s2", "acceleration", (F - k * x) / m, rate_of=v)\n'
 USE = '    power = Output("W", "power of the belt", f * u)\n'  # uses what the equation of motion does not
 DRY = '    mode = Mode()\n    R = Contact("N", "friction", mode=mode, slip=v, slide=f)\n'
+PLANAR = '    mode = Mode()\n    R = PlanarContact("N", "friction", mode=mode, slip=(v, u), slide=f)\n'
 STUCK = '    a = Output("m/s2", "acceleration", (F - k * x - R) / m, rate_of=v)\n'
 
 RESERVED = ("solver", "rates", "double", "t", "NULL", "INT64_MAX", "M_E", "fmi2True", "sqrt", "stop_time", "time")
@@ -39,6 +40,16 @@ WRONG = {
     "no rate": ("", 15, "v has no derivative: declare an Output or a State with rate_of=v"),
     "two rates": (RATE + RATE.replace("a =", "b ="), 17, "b and a both declare rate_of=v"),
     "two equations": (RATE + RATE, 17, "a is assigned twice: give the second equation another name"),
+    "an equation with the name of a component": (
+        PLANAR + '    R_x = Output("N", "pull", k * x)\n' + RATE,
+        18,
+        "the name R_x is reserved for R.x: choose another name",
+    ),
+    "a component with the name of an equation": (
+        '    R_x = Output("N", "pull", k * x)\n' + PLANAR + RATE,
+        18,
+        "the name R_x is reserved for R.x: choose another name",
+    ),
     "an unknown name": (RATE.replace("F -", "G -"), 16, "G is not defined: declare it before this line"),
     "no Python": (RATE.replace("F -", "F - -) "), 16, "invalid Python: "),
     "units": (

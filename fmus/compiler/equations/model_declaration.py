@@ -430,6 +430,8 @@ class _ClassBody(dict[str, Any]):
 
     def __setitem__(self, name: str, value: Any) -> None:
         if isinstance(self.get(name), Expression) or (name in SETTINGS and name in self.unread):
+            if element := getattr(self[name], "element", "") or getattr(value, "element", ""):
+                raise ModelError(f"the name {name} is reserved for {element}: choose another name")
             raise ModelError(
                 f"{name} is assigned twice: give the second equation another name, or add terms in a list by sum(terms)"
             )
