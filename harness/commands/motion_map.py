@@ -4,8 +4,8 @@ from functools import partial
 
 import click
 
-from ..errors import SceneError
-from .orbit import split_axis, split_numbers
+from ..errors import MAX_VALUE_LENGTH, SceneError
+from .orbit import split_axis
 from .terminal import (
     PERIOD_OPTION,
     SCHEDULER_OPTION,
@@ -82,3 +82,11 @@ def map_motions(
         folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])
         result = save_result(folder, compute, "map", describe_sources(source))
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)
+
+
+def split_numbers(text: str) -> list[float]:
+    """Return the numbers of an argument of --levels."""
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise SceneError(f"--levels {text[:MAX_VALUE_LENGTH]} is invalid; write numbers as in 0.1,0.2") from None

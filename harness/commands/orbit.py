@@ -63,11 +63,3 @@ def split_axis(text: str) -> tuple[str, list[float]]:
         hint = "write it as in v_belt=0.1:3 or, for 3 values or more, v_belt=0.1:3:60"
         raise SceneError(f"--over {text[:MAX_VALUE_LENGTH]} is invalid; {hint}") from None
     return name.strip(), [ends[0] + (ends[1] - ends[0]) * i / steps for i in range(steps)] + [ends[1]]
-
-
-def split_numbers(text: str) -> list[float]:
-    """Return the numbers of an argument of --levels."""
-    try:
-        return [float(word) for word in text.split(",")]
-    except ValueError:
-        raise SceneError(f"--levels {text[:MAX_VALUE_LENGTH]} is invalid; write numbers as in 0.1,0.2") from None

@@ -167,7 +167,7 @@ class Oscillator:
         self.initial = tuple(dict.fromkeys([*find_start_parameters(description, self.states), *angles]))
         modes = tuple(read_model_data(spec.fmu).contacts.values())
         readable = [name for name, item in self.variables.items() if item.causality == "output" and item.type == "Real"]
-        check_names("section", [section] * bool(section), [*modes, *self.states, *readable])
+        check_names("section", [section] * bool(section), [*dict.fromkeys((*modes, *self.states, *readable))])
         self.crossed = "" if section in modes else section
         self.released = slice(modes.index(section), modes.index(section) + 1) if section in modes else slice(None)
         reals = [*dict.fromkeys((*self.states, *self.rates, *[section] * bool(self.crossed), "solver.t_next"))]

@@ -126,7 +126,7 @@ class ReturnLabels:
     def label(self, point: np.ndarray) -> str:
         """Return the number of returns in a period."""
         count = self.motion.count_returns(point.tolist())
-        return IRREGULAR if count != count else count_text(int(count), "return") if count else "no return"
+        return IRREGULAR if np.isnan(count) else count_text(int(count), "return") if count else "no return"
 
 
 class MeasureLabels:
@@ -150,19 +150,16 @@ class MeasureLabels:
         if isinstance(row, str):
             raise HarnessError(row)
         value = row[self.column]
-        if value != value:
+        if np.isnan(value):
             return f"no {self.measure}"
         if not self.levels:
             if value % 1.0:
                 raise SceneError(f"{self.measure} = {value:.6g} is not a whole number: give the levels between regions")
             return f"{self.measure} {value:.0f}"
         below = int(np.searchsorted(self.levels, value, side="right"))
-        bounds = [f"{level:g}" for level in self.levels]
-        ends = (
-            [f"{bounds[below - 1]} <= "] * (below > 0),
-            [f" < {bounds[min(below, len(bounds) - 1)]}"] * (below < len(bounds)),
-        )
-        return "".join([*ends[0], self.measure, *ends[1]])
+        low = f"{self.levels[below - 1]:g} <= " if below > 0 else ""
+        high = f" < {self.levels[below]:g}" if below < len(self.levels) else ""
+        return f"{low}{self.measure}{high}"
 
 
 @contextmanager
