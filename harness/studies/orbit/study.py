@@ -174,21 +174,35 @@ class BranchTracer:
         points, names = list[SpecialPoint](), {motion.name for motion in two}
         for motion in one if not (self.oscillator.is_one_body and any(item.kind == STEADY for item in two)) else ():
             if motion.kind != STEADY and motion.name not in names:
-                seed, n_remarks = [motion], len(self.remarks)
-
-                def is_found(at: float, name: str = motion.name, seed: list[Motion] = seed) -> bool:
-                    found = [item for item in self.find_motions(at, [seed[0].y]) if item.name == name]
-                    seed[:] = found or seed
-                    return bool(found)
-
-                ((edge, end, *_),) = find_edges(is_found, motion.value, value, True, False)
-                if end == value and is_found(value):
-                    two.append(seed[0])
+                tracked, n_remarks = TrackedMotion(self, motion), len(self.remarks)
+                ((edge, end, *_),) = find_edges(tracked.move_to, motion.value, value, True, False)
+                if end == value and tracked.move_to(value):
+                    two.append(tracked.motion)
                 else:
                     how = "bisection on whether it is found"
-                    points.append(SpecialPoint(edge, f"{motion.name} {change}", seed[0].largest, how))
+                    points.append(SpecialPoint(edge, f"{motion.name} {change}", tracked.motion.largest, how))
                 del self.remarks[n_remarks:]  # on values between these two
         return points
+
+
+class TrackedMotion:
+    """Follows a motion from one value of the parameter to the next.
+
+    Attributes
+    ----------
+    motion : Motion
+        The motion at the last value at which it was found.
+    """
+
+    def __init__(self, tracer: BranchTracer, motion: Motion) -> None:
+        self.tracer, self.motion = tracer, motion
+
+    def move_to(self, value: float) -> bool:
+        """Return whether the motion is found at a value, starting from where it was found last."""
+        motions = self.tracer.find_motions(value, [self.motion.y])
+        match = next((motion for motion in motions if motion.name == self.motion.name), None)
+        self.motion = match or self.motion
+        return match is not None
 
 
 def join_changes(points: list[SpecialPoint]) -> list[SpecialPoint]:
