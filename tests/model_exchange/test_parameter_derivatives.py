@@ -1,6 +1,9 @@
 """Partial derivatives by parameters, of built native FMUs against central differences, and their declaration."""
 
+import subprocess
+from ctypes import CDLL, c_double, c_int
 from itertools import product
+from pathlib import Path
 from random import Random
 
 import fmi3_fixtures
@@ -12,6 +15,7 @@ from fmi3_as_fmi2 import Model, Slave
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, RODAS
 from native_fmus import build_native_fmus
+from native_host import compiler
 
 INTERFACES = {  # version and interface -> class of instances
     "FMI 2.0 ME": FMU2Model,
@@ -23,6 +27,17 @@ USER_MODELS = [path for path in (*EXAMPLE_MODELS, *LARGER_MODELS) if path.stem i
 CASES = [*product(MODELS, INTERFACES), *product(USER_MODELS, ("FMI 2.0 ME", "FMI 2.0 CS"))]
 H = 1e-4  # of a difference, relative to the value
 SPEEDS = (0.3, -0.2, 0.0)  # forward, backward, at rest
+COUNTING = """
+#include "model.h"
+int n_calls = 0;
+static void count(Model *model, struct Solver *solver, struct Tangent *tangent, bool *fault)
+{
+    n_calls++;
+    propagate_constant_tangent(model, solver, tangent, fault);
+}
+#define propagate_constant_tangent count
+#include "fmi2.c"
+"""
 
 
 def fmu_file(name, interface):
@@ -213,3 +228,54 @@ def test_both_interfaces_have_the_same_partial_derivatives(tmp_path):
         jacobians.append([fmu.getDirectionalDerivative(unknowns, [known], [1.0]) for known in knowns])
         fmu.freeInstance()
     assert jacobians[0] == jacobians[1]
+
+
+def test_derivatives_of_constants_are_calculated_once_until_a_parameter_changes(tmp_path):
+    """They are those of a new instance after each change of a parameter, also by a reset or a saved state."""
+    path = fmu_file("pacejka", "FMI 2.0 ME")
+    description = fmpy.read_model_description(path)
+    folder = Path(fmpy.extract(path, tmp_path))
+    binary = folder / "binaries" / "linux64" / "pacejka.so"
+    (folder / "sources" / "counting.c").write_text(COUNTING)
+    subprocess.run([compiler(), "-shared", "-fPIC", "-o", binary, folder / "sources" / "counting.c", "-lm"], check=True)
+    knowns = [v.valueReference for v in description.modelVariables if v.causality == "parameter" and is_known(v)]
+    mu_s, force, acceleration = (references(description, name) for name in ("mu_s", "F_ext", "a"))
+    calls = c_int.in_dll(CDLL(str(binary)), "n_calls")
+
+    def begin(fmu, static=0.9):
+        fmu.setReal(mu_s, [static])
+        fmu.setupExperiment()
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        fmu.newDiscreteStates()
+        fmu.enterContinuousTimeMode()
+
+    def slopes(fmu):
+        fmu.setContinuousStates((c_double * 3)(0.0, 0.02, 0.1), 3)
+        return [fmu.getDirectionalDerivative(acceleration, [known], [1.0]) for known in knowns]
+
+    fmu, other = (
+        FMU2Model(guid=description.guid, unzipDirectory=str(folder), modelIdentifier="pacejka", instanceName=name)
+        for name in ("one", "other")
+    )
+    for instance in (fmu, other):
+        instance.instantiate()
+    begin(fmu)
+    begin(other, 1.0)
+    first, changed = slopes(fmu), slopes(other)
+    assert (calls.value, first != changed) == (2 * len(knowns), True)
+    for value in (1.0, 0.0):
+        fmu.setReal(force, [value])
+        again = slopes(fmu), slopes(other), calls.value
+    assert again == (first, changed, 2 * len(knowns))
+    saved = fmu.getFMUState()
+    fmu.setReal(mu_s, [1.0])
+    assert (slopes(fmu), calls.value) == (changed, 3 * len(knowns))
+    fmu.setFMUState(saved)
+    assert slopes(fmu) == first
+    other.reset()
+    begin(other)
+    assert slopes(other) == first
+    fmu.freeFMUState(saved)
+    for instance in (fmu, other):
+        instance.freeInstance()

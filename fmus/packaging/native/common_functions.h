@@ -119,7 +119,7 @@ Status STATE_FUNCTION(Set, )(Handle instance, StateHandle state)
     REQUIRE_PHASE(instance, IN_ANY_PHASE);
     const State *own = matching_state(self, state);
     if (!own) return refuse_state(self);
-    memcpy(&self->state, own, sizeof *own);
+    replace_state(self, own);
     return STATUS_OK;
 }
 

@@ -399,8 +399,7 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     }
     for (size_t k = 0; k < nKnowns; k++) {
         struct Tangent tangent = {0};
-        *tangent_value(&tangent, knowns[k]) = 1.0;
-        fmi3Status status = evaluate_tangent(self, &tangent, variables[knowns[k]].is_real_parameter);
+        fmi3Status status = evaluate_tangent(self, &knowns[k], 1, &(double){1.0}, &tangent);
         sensitivity[k] = status ? NAN : 0.0;
         for (size_t i = 0; i < nUnknowns; i++) sensitivity[k] += seed[i] * *tangent_value(&tangent, unknowns[i]);
         if (status) return status;

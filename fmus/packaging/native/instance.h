@@ -19,6 +19,8 @@ typedef struct {
     int possible_phases; /* bits of the phases that its interface has */
     bool logging, logging_warnings;
     bool has_warned; /* about the rate of an input */
+    bool has_direction[VARIABLES];
+    struct Tangent directions[VARIABLES]; /* of each parameter: a change of 1, and those of the constants by it */
     Host host;
     char name[];
 } Instance;
@@ -235,6 +237,15 @@ static Status check_value(Instance *self, uint32_t reference, double value)
     return reason == OK ? STATUS_OK : refuse_value(self, reason, variable, value);
 }
 
+/* Tangents of constants change with the parameters. */
+static void forget_directions(Instance *self) { memset(self->has_direction, 0, sizeof self->has_direction); }
+
+static void replace_state(Instance *self, const State *state)
+{
+    memcpy(&self->state, state, sizeof *state);
+    forget_directions(self);
+}
+
 /* Set a variable to a valid value. */
 static Status write_value(Instance *self, uint32_t reference, double value)
 {
@@ -242,6 +253,7 @@ static Status write_value(Instance *self, uint32_t reference, double value)
     const Variable *variable = &variables[reference];
     bool fault = false;
     if (has_value(state, variable, value)) return STATUS_OK;
+    if (!variable->is_state_or_input) forget_directions(self);
     state->run.outputs_current = false;
     call_sequence_note_change(&state->run, &state->model, &fault);
     if (fault) return fail_run(self, DIVERGED, NAN, NAN);
@@ -287,7 +299,7 @@ static int64_t read_integer(const Instance *self, uint32_t reference)
 static void reset_state(Instance *self)
 {
     bool fault = false;
-    memcpy(&self->state, &initial, sizeof initial);
+    replace_state(self, &initial);
     self->has_warned = false;
     if (self->possible_phases & 1 << CONTINUOUS) model_exchange_enable(&self->state.run, &fault);
 }
@@ -420,20 +432,37 @@ static Status check_derivative_references(const Instance *self, const uint32_t u
     return STATUS_OK;
 }
 
+/* Add a change of a parameter and of the constants that depend on it. */
+static void add_direction(Instance *self, uint32_t parameter, double change, struct Tangent *tangent, bool *fault)
+{
+    struct Tangent *direction = &self->directions[parameter];
+    if (!self->has_direction[parameter]) {
+        memset(direction, 0, sizeof *direction);
+        *tangent_value(direction, parameter) = 1.0;
+        propagate_constant_tangent(&self->state.model, &self->state.run.solver, direction, fault);
+        self->has_direction[parameter] = !*fault;
+    }
+    const double *values = (const double *)direction;
+    double *sums = (double *)tangent;
+    for (size_t i = 0; i < sizeof *tangent / sizeof *sums; i++) sums[i] += change * values[i];
+}
+
 /* Calculate the directional derivative at the current point. Until initialisation ends, the states depend on the
  * parameters. Returns STATUS_DISCARD if values are missing. */
-static Status evaluate_tangent(Instance *self, struct Tangent *tangent, bool along_parameters)
+static Status evaluate_tangent(Instance *self, const uint32_t knowns[], size_t m, const double seed[],
+                               struct Tangent *tangent)
 {
     State *state = &self->state;
     bool fault = false;
     int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);
-    if (status != OK && state->run.phase >= RUNNING) return fail_run(self, status, NAN, NAN);
-    if (status == OK && along_parameters) {
-        if (state->run.phase < RUNNING) propagate_start_tangent(&state->model, &state->run.solver, tangent, &fault);
-        propagate_constant_tangent(&state->model, &state->run.solver, tangent, &fault);
+    if (status != OK) return state->run.phase < RUNNING ? STATUS_DISCARD : fail_run(self, status, NAN, NAN);
+    for (size_t i = 0; i < m && !fault; i++) {
+        if (!variables[knowns[i]].is_real_parameter) *tangent_value(tangent, knowns[i]) += seed[i];
+        else if (seed[i] != 0.0) add_direction(self, knowns[i], seed[i], tangent, &fault);
     }
-    if (status == OK && !fault) propagate_tangent(&state->model, &state->run.solver, tangent, &fault);
-    return status == OK && !fault ? STATUS_OK : STATUS_DISCARD;
+    if (!fault && state->run.phase < RUNNING) propagate_start_tangent(&state->model, &state->run.solver, tangent, &fault);
+    if (!fault) propagate_tangent(&state->model, &state->run.solver, tangent, &fault);
+    return fault ? STATUS_DISCARD : STATUS_OK;
 }
 
 /* Read time derivatives of outputs: the directional derivative along the time derivatives of states and inputs. */
@@ -469,13 +498,8 @@ static Status get_directional_derivative(Instance *self, const uint32_t unknowns
                                          size_t m, const double seed[], double sensitivity[], const char *function)
 {
     struct Tangent tangent = {0};
-    bool along_parameters = false;
     if (check_derivative_references(self, unknowns, n, knowns, m, seed, sensitivity, function)) return STATUS_ERROR;
-    for (size_t i = 0; i < m; i++) {
-        *tangent_value(&tangent, knowns[i]) += seed[i];
-        along_parameters |= variables[knowns[i]].is_real_parameter;
-    }
-    Status status = evaluate_tangent(self, &tangent, along_parameters);
+    Status status = evaluate_tangent(self, knowns, m, seed, &tangent);
     for (size_t i = 0; i < n; i++) sensitivity[i] = status ? NAN : *tangent_value(&tangent, unknowns[i]);
     return status;
 }
