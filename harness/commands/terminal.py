@@ -328,7 +328,7 @@ class Terminal:
         else:
             console = Console(markup=False, highlight=False)  # brackets in units and names are not markup
             for block in blocks:
-                console.print(block.for_terminal() if hasattr(block, "for_terminal") else block)
+                console.print(block.for_terminal(console.width) if hasattr(block, "for_terminal") else block)
             if folder:
                 from ..results.provenance import replacement_note
 

@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from html import escape
 from itertools import groupby
 from pathlib import Path
-from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from ..errors import HarnessError, SceneError, by_interface
@@ -18,6 +17,7 @@ from . import provenance
 from .files import column_heading, to_json, write_csv_rows
 
 if TYPE_CHECKING:
+    import rich.console
     import rich.table
 
 
@@ -232,32 +232,58 @@ class ResultTable:
         rows = tuple(row for line, texts in self.groups() for row in (*[line] * bool(line), *texts))
         return (SummaryTable(self.headings, rows, self.title),) if rows else ()
 
-    def for_terminal(self) -> "rich.table.Table":
-        """Return the table for the terminal, in the style of all results."""
+    def for_terminal(self, width: int) -> "rich.console.Group":
+        """Return the table for lines of a number of characters, in the style of all results.
+
+        If its columns do not fit, even with each unit below its heading, they are in several tables, one below the
+        other, which all begin with the first column.
+        """
+        from rich.console import Group
+
+        gap, headings = self.padding + 1, list(self.headings)
+        widths = self._column_widths(headings)
+        if sum(widths) + gap * (len(widths) - 1) > width:
+            headings = [
+                name if column.is_text else name.replace(" [", "\n[")
+                for name, column in zip(headings, self.columns, strict=True)
+            ]
+            widths = self._column_widths(headings)
+        parts = [[0]]
+        for i in range(1, len(widths)):
+            if parts[-1] != [0] and sum(widths[j] + gap for j in parts[-1]) + widths[i] > width:
+                parts.append([0])
+            parts[-1].append(i)
+        tables = [self._terminal_table(headings, part) for part in parts]
+        tables[0].title, tables[0].min_width = self.title or None, len(self.title)
+        tables[-1].caption = self.note or None
+        return Group(*tables)
+
+    def _column_widths(self, headings: Sequence[str]) -> list[int]:
+        """Return the least width of each column; each word of a column of words may be in a line of its own."""
+        cells = zip(headings, *self.rows(), strict=True)
+        return [
+            max(len(line) for cell in column for line in (cell.split() or [""] if is_text else cell.split("\n")))
+            for column, is_text in zip(cells, (column.is_text for column in self.columns), strict=True)
+        ]
+
+    def _terminal_table(self, headings: Sequence[str], part: Sequence[int]) -> "rich.table.Table":
+        """Return the table for the terminal with some of the columns."""
         from rich.box import SIMPLE_HEAD
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        table = RichTable(title=self.title or None, title_justify="left", box=SIMPLE_HEAD, show_edge=False)
-        table.min_width = len(self.title)
-        table.padding, table.caption, table.caption_justify = (0, self.padding, 0, 0), self.note or None, "left"
-        # words may be in several lines, and headings if that is not enough
-        columns = zip(self.columns, zip(self.headings, *self.rows(), strict=True), strict=True)
-        widths = [
-            max(len(word) for cell in cells for word in (cell.split() or [""] if column.is_text else [cell]))
-            for column, cells in columns
-        ]
-        is_wide = sum(widths) + 2 * self.padding * (len(widths) - 1) > get_terminal_size().columns
-        for column in self.columns:
-            heading = column.heading.replace(" [", "\n[") if is_wide and not column.is_text else column.heading
-            justify = {"no_wrap": column.heading == "unit"} if column.is_text else {"justify": "right", "no_wrap": True}
-            table.add_column(heading, overflow="fold", **justify)
+        table = RichTable(title_justify="left", caption_justify="left", box=SIMPLE_HEAD, show_edge=False)
+        table.padding = (0, self.padding, 0, 0)
+        for i in part:
+            is_text = self.columns[i].is_text
+            justify = {"no_wrap": headings[i] == "unit"} if is_text else {"justify": "right", "no_wrap": True}
+            table.add_column(headings[i], overflow="fold", **justify)
         for line, rows in self.groups():
             if line:
                 table.add_section()
-                table.add_row(Text(line[0], style="bold"), *line[1:])
+                table.add_row(Text(line[0], style="bold"), *(line[i] for i in part[1:]))
             for row in rows:
-                table.add_row(*(f"  {row[0]}" if line else row[0], *row[1:]))
+                table.add_row(f"  {row[0]}" if line else row[0], *(row[i] for i in part[1:]))
         return table
 
     def as_html(self) -> str:
@@ -285,7 +311,7 @@ def format_blocks(blocks: Iterable[ResultTable | str], width: int) -> str:
     console = Console(width=width, markup=False, highlight=False)
     with console.capture() as text:
         for block in blocks:
-            console.print(block.for_terminal() if isinstance(block, ResultTable) else block)
+            console.print(block.for_terminal(width) if isinstance(block, ResultTable) else block)
     return text.get().rstrip("\n")
 
 

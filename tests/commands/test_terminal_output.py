@@ -20,7 +20,7 @@ from fmus.compiler.model_lookup import more_model_names
 from harness import HarnessError, PrecisionResult
 from harness.commands import commands
 from harness.references.peer_solvers import FMU, ME
-from harness.results.summary import format_blocks
+from harness.results.summary import ResultColumn, ResultTable, format_blocks
 from harness.studies.precision.study import LawDeviation, Point, PrecisionCase
 
 SCENES = {file.stem: tomllib.loads(file.read_text()) for file in sorted((ROOT / "harness/scenes").glob("*.toml"))}
@@ -68,6 +68,18 @@ def test_tables_of_long_commands_fit_into_80_columns():
     law = LawDeviation("stickslip", "stickslip-threshold", "threshold", *(1.2e-5,) * 4, 3.3451, 0.877, 1.2e-13)
     result = PrecisionResult("stickslip", cases, tuple(points), (law,))
     assert_fits(format_blocks(result.blocks(), WIDTH), "1e-3:", "model exchange", "creep [m/s]")
+
+
+@pytest.mark.parametrize("width", [30, 60, 100, 400])
+def test_a_table_of_any_width_shows_each_cell(width):
+    """Without a lost digit; of columns that do not fit, several tables begin with the first one."""
+    items = [{"t": 0.1 * i, **{f"x{n}": 1e-6 * (-i) ** n for n in range(9)}} for i in range(3)]
+    columns = [ResultColumn(f"{name} [N.m/rad]", f"{{0[{name}]:.5e}}") for name in items[0]]
+    table = ResultTable(items, (*columns[:1], ResultColumn("words", "F1 sticks", is_text=True), *columns[1:]), "All")
+    text = format_blocks([table], width)
+    assert max(map(len, text.splitlines())) <= width
+    assert all(cell in text.split() for row in table.rows() for cell in row if " " not in cell)
+    assert text.count("1.00000e-01") == text.count("\u2500\n")
 
 
 @pytest.mark.parametrize("command", ["", *commands.commands])
