@@ -36,8 +36,9 @@ typedef struct { /* a parameter, or the factor of a driven input, or the start v
 
 typedef struct {
     Instance instance;
-    Function set_time, set_states, get_rates, get_indicators, get, set, derive, complete; /* the last may be NULL */
-    int64_t fmi;                                                                          /* 2 or 3 */
+    Function set_time, set_states, get_states, get_rates, get_indicators, get, set, get_mode, derive;
+    Function update, enter_event, enter_continuous, complete, save, restore, release; /* the last four may be NULL */
+    int64_t fmi;                                                                      /* 2 or 3 */
     size_t n, m, q, r, n_inputs; /* states, parameters, indicators, outputs, driven inputs */
     const Reference *states, *rates, *outputs, *inputs;
     const Parameter *parameters;
@@ -55,7 +56,6 @@ typedef struct {
     int64_t indicator;
     bool is_fresh; /* the first stage and the indicators belong to the present point */
     /* events, see variational_events.c */
-    Function update, enter_event, enter_continuous, get_states, get_mode, save, restore, release; /* the last may be NULL */
     const Reference *influenced; /* rates and outputs */
     const Reference *modes;
     size_t n_influenced, n_modes, n_signals;
@@ -76,6 +76,16 @@ static bool read(const Run *run, const Reference *references, size_t n, double *
                                                                                    values, n) <= WARNING;
 }
 
+static bool write(const Run *run, const Reference *references, size_t n, const double *values)
+{
+    if (!n) return true;
+    if (run->fmi == 2)
+        return ((int (*)(Instance, const Reference *, size_t, const double *))run->set)(run->instance, references, n,
+                                                                                     values) <= WARNING;
+    return ((int (*)(Instance, const Reference *, size_t, const double *, size_t))run->set)(run->instance, references, n,
+                                                                                         values, n) <= WARNING;
+}
+
 static double input_at(const Run *run, size_t j, double t)
 {
     const double *begin = run->table, *end = begin + 1 + run->n_inputs;
@@ -90,12 +100,7 @@ static bool set_point_with(const Run *run, double t, const double *y, int64_t wh
     double *u = run->work;
     size_t n = run->n_inputs;
     for (size_t j = 0; j < n; j++) u[j] = input_at(run, j, t) * ((int64_t)j == which ? factor : 1.0);
-    if (n && run->fmi == 2)
-        ok &= ((int (*)(Instance, const Reference *, size_t, const double *))run->set)(run->instance, run->inputs, n,
-                                                                                     u) <= WARNING;
-    if (n && run->fmi == 3)
-        ok &= ((int (*)(Instance, const Reference *, size_t, const double *, size_t))run->set)(
-                  run->instance, run->inputs, n, u, n) <= WARNING;
+    ok &= write(run, run->inputs, n, u);
     if (run->n) ok &= ((int (*)(Instance, const double *, size_t))run->set_states)(run->instance, y, run->n) <= WARNING;
     return ok;
 }
@@ -481,15 +486,9 @@ static int advance(Run *run, double target)
     return REACHED;
 }
 
-/* Set parameter i. */
 static bool set_parameter(const Run *run, size_t i, double value)
 {
-    const Reference *reference = &run->parameters[i].reference;
-    if (run->fmi == 2)
-        return ((int (*)(Instance, const Reference *, size_t, const double *))run->set)(run->instance, reference, 1,
-                                                                                     &value) <= WARNING;
-    return ((int (*)(Instance, const Reference *, size_t, const double *, size_t))run->set)(run->instance, reference, 1,
-                                                                                         &value, 1) <= WARNING;
+    return write(run, &run->parameters[i].reference, 1, &value);
 }
 
 /* Indicator k at the present point, with the states moved by e along their change by parameter i, or, for i = m, along

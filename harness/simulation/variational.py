@@ -44,12 +44,9 @@ from .stepping import TIME
 from .variable_values import REAL_TYPES, find_bound
 from .variational_loop import (
     EARLY_EVENT,
-    EVENT_FIELDS,
-    EVENT_FUNCTIONS,
     EVENT_TERMINATED,
     FAILED,
     FIXED,
-    FUNCTION_FIELDS,
     FUNCTIONS,
     LOG_FULL,
     NO_END,
@@ -91,21 +88,23 @@ class Known:
 
     Attributes
     ----------
-    variable, value
-        Its variable and its value.
+    variable
+        Its variable.
     state : int
         Index of the state whose start value it is, or -1.
     input : int
         Index of the driven input whose factor it is, or -1.
+    value : float
+        Its value, which is 1 for a factor.
     side : int or None
         Whether the FMU takes both neighbouring values (0), or only larger (1) or smaller (-1) ones; None if it takes
         none, or cannot be changed after the start.
     """
 
     variable: Any
-    value: float
     state: int
     input: int
+    value: float = 1.0
     side: int | None = None
 
     @property
@@ -183,22 +182,16 @@ class VariationalRun:
         self.columns = {name: np.asarray(column, dtype=float) for name, column in spec.inputs.items()}
         self.settings = {variables[name]: value for name, value in spec.values.items()}
         self.states = states
-        self.knowns = [self.select_known(variables[name]) for name in parameters]
+        self.knowns = [
+            Known(item, *(group.index(item) if item in group else -1 for group in (states, self.inputs)))
+            for item in map(variables.__getitem__, parameters)
+        ]
         calculated = {unknown.variable.name for unknown in description.initialUnknowns}
         self.calculated = [i for i, state in enumerate(states) if state.name in calculated]
         self.modes = tuple(read_model_data(spec.fmu).contacts.values())
         self.update = self.fmu.newDiscreteStates if instance.is_fmi2 else self.fmu.updateDiscreteStates
         self.n, self.m, self.q = len(states), len(parameters), int(description.numberOfEventIndicators or 0)
         self.allocate({"states": states, "rates": rates, "inputs": self.inputs})
-
-    def select_known(self, variable: Any) -> Known:
-        """Return what is needed of a parameter."""
-        value = float(self.settings.get(variable, variable.start or 0.0))
-        if variable in self.states:
-            return Known(variable, value, self.states.index(variable), -1)
-        if variable in self.inputs:
-            return Known(variable, 1.0, -1, self.inputs.index(variable))
-        return Known(variable, value, -1, -1)
 
     def allocate(self, groups: dict[str, list[Any]]) -> None:
         """Allocate the buffers of the loop."""
@@ -226,28 +219,26 @@ class VariationalRun:
         outputs = [unknown.variable for unknown in instance.description.outputs]
         groups["influenced"] = [*groups["rates"], *(output for output in outputs if output.type in REAL_TYPES)]
         self.references = {name: instance.make_references(group) for name, group in groups.items()}
-        self.structs = (ParameterStruct * max(m, 1))()
-        self.change_values({})
-        run = self.run = RunStruct(instance=instance.component, fmi=2 if is_fmi2 else 3, n=n, m=m, q=q)
-        run.r, run.n_inputs, run.n_times = len(self.spec.outputs), len(self.inputs), len(self.times)
-        run.n_modes, run.n_signals, run.duration = (
-            len(self.modes),
-            len(self.columns.get(TIME, ())),
-            self.stop - self.start,
+        self.structs = (ParameterStruct * max(m, 1))(
+            *(
+                ParameterStruct(known.variable.valueReference, known.state >= 0, known.input, kind=known.kind)
+                for known in self.knowns
+            )
         )
-        run.n_influenced = len(groups["influenced"])
-        version = instance.description.fmiVersion
-        names = [*FUNCTIONS[version], "GetDirectionalDerivative"]
-        not_needed = is_fmi2 and instance.interface.completedIntegratorStepNotNeeded
-        if not not_needed and (is_fmi2 or instance.interface.needsCompletedIntegratorStep):
-            names.append("CompletedIntegratorStep")
-        event_names = EVENT_FUNCTIONS[version][: None if self.can_save else -3]
-        functions = {
-            **dict(zip(FUNCTION_FIELDS, names, strict=False)),
-            **dict(zip(EVENT_FIELDS, event_names, strict=False)),
-        }
-        for field, name in functions.items():
-            setattr(run, field, cast(instance.function(name), c_void_p))
+        self.change_values({})
+        sizes = {"n": n, "m": m, "q": q, "r": len(self.spec.outputs), "duration": self.stop - self.start}
+        sizes |= {f"n_{name}": len(groups[name]) for name in ("inputs", "modes", "influenced")}
+        sizes |= {"n_times": len(self.times), "n_signals": len(self.columns.get(TIME, ()))}
+        run = self.run = RunStruct(instance=instance.component, fmi=2 if is_fmi2 else 3, **sizes)
+        completes = (
+            not instance.interface.completedIntegratorStepNotNeeded
+            if is_fmi2
+            else instance.interface.needsCompletedIntegratorStep
+        )
+        absent = (() if self.can_save else ("save", "restore", "release")) + (() if completes else ("complete",))
+        for field, names in FUNCTIONS.items():
+            if field not in absent:
+                setattr(run, field, cast(instance.function(names[0 if is_fmi2 else -1]), c_void_p))
         for field, references in {**self.references, "parameters": self.structs}.items():
             setattr(run, field, cast(references, c_void_p))
         for field, array in self.arrays.items():
@@ -263,17 +254,10 @@ class VariationalRun:
     def change_values(self, values: Mapping[str, float]) -> None:
         """Give variables other values in the following runs, by name."""
         self.settings |= {self.instance.variables[name]: value for name, value in values.items()}
-        sides = [known.side for known in self.knowns]
-        self.knowns = [self.select_known(known.variable) for known in self.knowns]
-        for known, side in zip(self.knowns, sides, strict=True):
-            known.side = side
         for struct, known in zip(self.structs, self.knowns, strict=False):
-            struct.reference, struct.input, struct.is_start = (
-                known.variable.valueReference,
-                known.input,
-                known.state >= 0,
-            )
-            struct.value, struct.kind = known.value, known.kind
+            if known.input < 0:
+                known.value = float(self.settings.get(known.variable, known.variable.start or 0.0))
+            struct.value = known.value
 
     def allocate_logs(self) -> None:
         """Allocate the logs of events and of times without derivatives, and the table of inputs."""
@@ -356,7 +340,7 @@ class VariationalRun:
             if known is None:
                 raise
             return None
-        return self.read(FUNCTIONS["2.0"][3], self.q)
+        return self.read("GetEventIndicators", self.q)
 
     def find_side(self, known: Known) -> int | None:
         """Return which neighbouring values of a parameter the FMU takes, as `Known.side`."""

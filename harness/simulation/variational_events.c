@@ -88,12 +88,7 @@ double set_table(Run *run, double t)
     double interval = *after - *before, share = interval > 0.0 ? (t - *before) / interval : 0.0;
     now[0] = t, then[0] = is_last ? t + 1.0 : *after;
     for (size_t j = 1; j < width; j++) now[j] = (1.0 - share) * before[j] + share * after[j], then[j] = after[j];
-    if (run->fmi == 2)
-        ((int (*)(Instance, const Reference *, size_t, const double *))run->set)(run->instance, run->inputs, width - 1,
-                                                                               now + 1);
-    else
-        ((int (*)(Instance, const Reference *, size_t, const double *, size_t))run->set)(
-            run->instance, run->inputs, width - 1, now + 1, width - 1);
+    write(run, run->inputs, width - 1, now + 1);
     return is_last ? INFINITY : *after;
 }
 

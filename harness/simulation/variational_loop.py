@@ -40,28 +40,23 @@ class ParameterStruct(Structure):
     )
 
 
-FUNCTION_FIELDS = ("set_time", "set_states", "get_rates", "get_indicators", "get", "set", "derive", "complete")
-EVENT_FIELDS = ("update", "enter_event", "enter_continuous", "get_states", "get_mode", "save", "restore", "release")
-EVENT_FUNCTIONS = {
-    "2.0": (
-        *("NewDiscreteStates", "EnterEventMode", "EnterContinuousTimeMode", "GetContinuousStates", "GetInteger"),
-        *("GetFMUstate", "SetFMUstate", "FreeFMUstate"),
-    ),
-    "3.0": (
-        *("UpdateDiscreteStates", "EnterEventMode", "EnterContinuousTimeMode", "GetContinuousStates", "GetInt64"),
-        *("GetFMUState", "SetFMUState", "FreeFMUState"),
-    ),
-}
-FUNCTIONS = {
-    "2.0": ("SetTime", "SetContinuousStates", "GetDerivatives", "GetEventIndicators", "GetReal", "SetReal"),
-    "3.0": (
-        "SetTime",
-        "SetContinuousStates",
-        "GetContinuousStateDerivatives",
-        "GetEventIndicators",
-        "GetFloat64",
-        "SetFloat64",
-    ),
+FUNCTIONS = {  # fields of Run -> functions of FMI 2.0, and those of FMI 3.0 that have other names
+    "set_time": ("SetTime",),
+    "set_states": ("SetContinuousStates",),
+    "get_states": ("GetContinuousStates",),
+    "get_rates": ("GetDerivatives", "GetContinuousStateDerivatives"),
+    "get_indicators": ("GetEventIndicators",),
+    "get": ("GetReal", "GetFloat64"),
+    "set": ("SetReal", "SetFloat64"),
+    "get_mode": ("GetInteger", "GetInt64"),
+    "derive": ("GetDirectionalDerivative",),
+    "update": ("NewDiscreteStates", "UpdateDiscreteStates"),
+    "enter_event": ("EnterEventMode",),
+    "enter_continuous": ("EnterContinuousTimeMode",),
+    "complete": ("CompletedIntegratorStep",),
+    "save": ("GetFMUstate", "GetFMUState"),
+    "restore": ("SetFMUstate", "SetFMUState"),
+    "release": ("FreeFMUstate", "FreeFMUState"),
 }
 ARRAYS = (
     *("z", "z1", "k", "dense", "largest", "nominals", "g", "g1", "samples"),
@@ -76,7 +71,7 @@ class RunStruct(Structure):
 
     _fields_ = (
         ("instance", c_void_p),
-        *((name, c_void_p) for name in FUNCTION_FIELDS),
+        *((name, c_void_p) for name in FUNCTIONS),
         ("fmi", c_int64),
         *((name, c_size_t) for name in ("n", "m", "q", "r", "n_inputs")),
         *((name, c_void_p) for name in ("states", "rates", "outputs", "inputs", "parameters")),
@@ -93,11 +88,8 @@ class RunStruct(Structure):
         ("output_states", c_void_p),
         ("indicator", c_int64),
         ("is_fresh", c_bool),
-        *((name, c_void_p) for name in EVENT_FIELDS),
-        ("influenced", c_void_p),
-        ("modes", c_void_p),
-        *((name, c_size_t) for name in ("n_influenced", "n_modes")),
-        ("n_signals", c_size_t),
+        *((name, c_void_p) for name in ("influenced", "modes")),
+        *((name, c_size_t) for name in ("n_influenced", "n_modes", "n_signals")),
         ("signals", c_void_p),
         *((name, c_double) for name in ("duration", "tolerance", "next_event", "row", "last_t")),
         *((name, c_size_t) for name in ("n_at_once", "capacity", "capacity_notes", "n_events", "n_notes", "n_splits")),

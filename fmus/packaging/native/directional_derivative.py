@@ -93,7 +93,7 @@ def function_around(name: str, body: list[ast.stmt]) -> ast.FunctionDef:
     text = f'def {name}(self, solver, {TANGENT}):\n    """Calculate the directional derivative."""'
     function = ast.parse(text).body[0]
     assert isinstance(function, ast.FunctionDef)
-    function.body += remove_unused(body)
+    function.body += remove_unused(body, set())
     return function
 
 
@@ -109,30 +109,23 @@ def assigned_attributes(statements: list[ast.stmt]) -> list[str]:
     return list(dict.fromkeys(target.attr for target in targets if isinstance(target, ast.Attribute)))
 
 
-def remove_unused(statements: list[ast.stmt]) -> list[ast.stmt]:
-    """Remove assignments to local variables that nothing reads, and conditions without statements."""
-    while True:
-        parts = [node for statement in statements for node in ast.walk(statement)]
-        read = {node.id for node in parts if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
-        fewer = keep_used(statements, read)
-        if len([node for statement in fewer for node in ast.walk(statement)]) == len(parts):
-            return statements
-        statements = fewer
+def remove_unused(statements: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
+    """Return statements without assignments to local variables that nothing reads, and without empty conditions.
 
-
-def keep_used(statements: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
-    """Return statements without assignments to names that are not among those read."""
+    `read` has the names that later statements read, and receives those of the result.
+    """
     result: list[ast.stmt] = []
-    for node in statements:
+    for node in reversed(statements):
         match node:
             case ast.Assign(targets=[ast.Name(id=name)]) if name not in read:
                 continue
             case ast.If():
-                body, orelse = keep_used(node.body, read), keep_used(node.orelse, read)
-                if body or orelse:
-                    result.append(ast.If(node.test, body or [ast.Pass()], orelse))
-            case _:
-                result.append(node)
+                body, orelse = (remove_unused(part, read) for part in (node.body, node.orelse))
+                if not body and not orelse:
+                    continue
+                node = ast.If(node.test, body or [ast.Pass()], orelse)
+        read |= {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load)}
+        result.insert(0, node)
     return result
 
 
