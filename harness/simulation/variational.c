@@ -22,7 +22,9 @@ static const double FAR = 1e50; /* an indicator as large as this stands for no e
 
 typedef void *Instance;
 typedef uint32_t Reference;
-typedef void (*Function)(void);
+typedef void (*Function)(void); /* whose parameters depend on the version of FMI */
+typedef int (*Action)(Instance);
+typedef int (*Getter)(Instance, double *, size_t);
 
 typedef struct { /* a parameter, or the factor of a driven input, or the start value of a state */
     Reference reference;
@@ -36,9 +38,13 @@ typedef struct { /* a parameter, or the factor of a driven input, or the start v
 
 typedef struct {
     Instance instance;
-    Function set_time, set_states, get_states, get_rates, get_indicators, get, set, get_mode, derive;
-    Function update, enter_event, enter_continuous, complete, save, restore, release; /* the last four may be NULL */
-    int64_t fmi;                                                                      /* 2 or 3 */
+    int (*set_time)(Instance, double), (*set_states)(Instance, const double *, size_t);
+    Getter get_states, get_rates, get_indicators;
+    Function get, set, get_mode, derive, update;
+    Action enter_event, enter_continuous;
+    int (*save)(Instance, void **), (*restore)(Instance, void *), (*release)(Instance, void **); /* or NULL */
+    Function complete;                                                                           /* or NULL */
+    int64_t fmi;                                                                                 /* 2 or 3 */
     size_t n, m, q, r, n_inputs; /* states, parameters, indicators, outputs, driven inputs */
     const Reference *states, *rates, *outputs, *inputs;
     const Parameter *parameters;
@@ -96,20 +102,19 @@ static double input_at(const Run *run, size_t j, double t)
 /* Set time, driven inputs and states; `factor` is that of the input `which`. */
 static bool set_point_with(const Run *run, double t, const double *y, int64_t which, double factor)
 {
-    bool ok = ((int (*)(Instance, double))run->set_time)(run->instance, t) <= WARNING;
+    bool ok = run->set_time(run->instance, t) <= WARNING;
     double *u = run->work;
     size_t n = run->n_inputs;
     for (size_t j = 0; j < n; j++) u[j] = input_at(run, j, t) * ((int64_t)j == which ? factor : 1.0);
     ok &= write(run, run->inputs, n, u);
-    if (run->n) ok &= ((int (*)(Instance, const double *, size_t))run->set_states)(run->instance, y, run->n) <= WARNING;
-    return ok;
+    return ok & (!run->n || run->set_states(run->instance, y, run->n) <= WARNING);
 }
 
 bool set_point(const Run *run, double t, const double *y) { return set_point_with(run, t, y, -1, 1.0); }
 
-static bool get_array(const Run *run, Function function, double *values, size_t n)
+static bool get_array(const Run *run, Getter getter, double *values, size_t n)
 {
-    return !n || ((int (*)(Instance, double *, size_t))function)(run->instance, values, n) <= WARNING;
+    return !n || getter(run->instance, values, n) <= WARNING;
 }
 
 /* Derivatives of unknowns at the present point by parameter i, whose states change by s. */

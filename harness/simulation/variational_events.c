@@ -19,22 +19,19 @@ typedef struct {
     double next;
 } EventInfo; /* of FMI 2.0 */
 
-static bool call(const Run *run, Function function) { return ((int (*)(Instance))function)(run->instance) <= WARNING; }
+static bool call(const Run *run, Action action) { return action(run->instance) <= WARNING; }
 
 static void *save(const Run *run)
 {
     void *state = NULL;
-    return run->save && ((int (*)(Instance, void **))run->save)(run->instance, &state) <= WARNING ? state : NULL;
+    return run->save && run->save(run->instance, &state) <= WARNING ? state : NULL;
 }
 
-static bool restore(const Run *run, void *state)
-{
-    return ((int (*)(Instance, void *))run->restore)(run->instance, state) <= WARNING;
-}
+static bool restore(const Run *run, void *state) { return run->restore(run->instance, state) <= WARNING; }
 
 static void release(const Run *run, void *state)
 {
-    if (state) ((int (*)(Instance, void **))run->release)(run->instance, &state);
+    if (state) run->release(run->instance, &state);
 }
 
 static bool read_modes(const Run *run, int64_t *modes)
@@ -248,8 +245,7 @@ static int gradients(Run *run, const size_t *which, size_t count, const double *
             if (parameter->kind != TUNABLE) continue;
             run->indicator = (int64_t)i;
             if (parameter->side == NO_SIDE) return NO_NEIGHBOUR;
-            double e = parameter->value != 0.0 ? SHIFT * fabs(parameter->value) : SHIFT;
-            gradient[i] += indicator_slope(run, which[l], i, e, (int)parameter->side, NULL);
+            gradient[i] += indicator_slope(run, which[l], i, SHIFT * parameter_size(run, i), (int)parameter->side, NULL);
         }
         for (size_t i = 0; i <= m; i++)
             if (!isfinite(gradient[i])) return NO_VALUE;

@@ -53,10 +53,10 @@ FUNCTIONS = {  # fields of Run -> functions of FMI 2.0, and those of FMI 3.0 tha
     "update": ("NewDiscreteStates", "UpdateDiscreteStates"),
     "enter_event": ("EnterEventMode",),
     "enter_continuous": ("EnterContinuousTimeMode",),
-    "complete": ("CompletedIntegratorStep",),
     "save": ("GetFMUstate", "GetFMUState"),
     "restore": ("SetFMUstate", "SetFMUState"),
     "release": ("FreeFMUstate", "FreeFMUState"),
+    "complete": ("CompletedIntegratorStep",),
 }
 ARRAYS = (
     *("z", "z1", "k", "dense", "largest", "nominals", "g", "g1", "samples"),

@@ -62,8 +62,8 @@ def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, d
     start, prepare, outputs = (
         function_tree(model.__dict__[name]).body for name in ("initial_state", "prepare", "compute_outputs")
     )
-    read = {node.attr for statement in outputs for node in ast.walk(statement) if isinstance(node, ast.Attribute)}
-    constants = [name for name in assigned_attributes(prepare) if name in read]
+    read = list_attributes(outputs, ast.Load)
+    constants = [name for name in list_attributes(prepare, ast.Store) if name in read]
     point = {"t": "t"} | {name: component_name("y", name) for name in model.states}
     point |= {name: component_name("modes", name) for name in model.contacts}
     begin = parse_statements(f"{name} = solver.{number}" for name, number in point.items())
@@ -97,16 +97,10 @@ def function_around(name: str, body: list[ast.stmt]) -> ast.FunctionDef:
     return function
 
 
-def assigned_attributes(statements: list[ast.stmt]) -> list[str]:
-    """Return the attributes of self that statements assign, in order of their first assignment."""
-    targets = [
-        target
-        for statement in statements
-        for node in ast.walk(statement)
-        if isinstance(node, ast.Assign)
-        for target in node.targets
-    ]
-    return list(dict.fromkeys(target.attr for target in targets if isinstance(target, ast.Attribute)))
+def list_attributes(statements: list[ast.stmt], use: type[ast.expr_context]) -> list[str]:
+    """Return the attributes that statements read or assign, without repetition."""
+    nodes = (node for statement in statements for node in ast.walk(statement) if isinstance(node, ast.Attribute))
+    return list(dict.fromkeys(node.attr for node in nodes if isinstance(node.ctx, use)))
 
 
 def remove_unused(statements: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
