@@ -15,15 +15,7 @@ Circuits and Systems I 47 (2000) 204-220.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from ctypes import (
-    byref,
-    c_double,
-    c_int64,
-    c_size_t,
-    c_uint32,
-    c_void_p,
-    cast,
-)
+from ctypes import byref, c_double, c_int64, c_uint32, c_void_p, cast
 from dataclasses import dataclass
 from io import StringIO
 from math import nan
@@ -38,7 +30,7 @@ from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from .event_mode import MAX_EVENTS, update_discrete_states
 from .fmu_archive import DESCRIPTION_FILE, read_leniently
-from .fmu_instance import CALL_FAILURES, WARNING, FmuInstance, LogCapture
+from .fmu_instance import CALL_FAILURES, FmuInstance, LogCapture
 from .model_data import read_model_data
 from .stepping import TIME
 from .variable_values import REAL_TYPES, find_bound
@@ -278,45 +270,30 @@ class VariationalRun:
     # ---- calls of the FMU
 
     def read(self, name: str, count: int) -> np.ndarray:
-        """Return values (count,) that a function of the FMU writes into an array."""
-        values = np.zeros(count)
+        """Return values (count,) that a method of the FMU writes into an array."""
+        values = (c_double * count)()
         if count:
-            self.call(name, c_void_p(values.ctypes.data), c_size_t(count))
-        return values
-
-    def call(self, name: str, *arguments: Any) -> None:
-        """Call a function of the library with arguments of ctypes; raise HarnessError if it fails."""
-        function = self.fmu.dll[f"{self.instance.prefix}{name}"]  # without declared types, which exclude buffers
-        if function(self.instance.component, *arguments) > WARNING:
-            raise self.failure(f"{name} fails at t = {self.run.t:.9g} s")
+            getattr(self.fmu, name)(values, count)
+        return np.array(values)
 
     def start_slopes(self, known: Known) -> np.ndarray:
         """Return the derivatives (n,) of the states at the start, in initialization mode."""
-        slopes, count = np.zeros(self.n), len(self.calculated)
+        slopes = np.zeros(self.n)
         if known.state >= 0:
             slopes[known.state] = 1.0
-        elif known.is_set and count:
-            unknowns = (c_uint32 * count)(*(self.references["states"][i] for i in self.calculated))
-            slopes[self.calculated] = self.derive(known, unknowns, count)
+        elif known.is_set and self.calculated:
+            unknowns = [self.states[i].valueReference for i in self.calculated]
+            reference = known.variable.valueReference
+            slopes[self.calculated] = self.fmu.getDirectionalDerivative(unknowns, [reference], [1.0])
         return slopes
-
-    def derive(self, known: Known, unknowns: Any, count: int) -> np.ndarray:
-        """Return the partial derivatives (count,) of unknowns by a parameter."""
-        seed, values = np.ones(1), np.zeros(count)
-        pointers: list[Any] = [c_void_p(array.ctypes.data) for array in (seed, values)]
-        if not self.instance.is_fmi2:
-            pointers = [pointers[0], c_size_t(1), pointers[1], c_size_t(count)]
-        arguments = (unknowns, c_size_t(count), (c_uint32 * 1)(known.variable.valueReference), c_size_t(1))
-        self.call("GetDirectionalDerivative", *arguments, *pointers)
-        return values
 
     def failure(self, reason: str) -> HarnessError:
         """Return the error of a run that failed, with the message of the FMU if there is one."""
         return HarnessError(self.instance.log.error_message or f"{self.spec.fmu.name}: {reason}")
 
-    def initialize(self, changed: Known | None = None, value: float = 0.0) -> None:
+    def initialize(self, changed: Known | None = None, change: float = 0.0) -> None:
         """Enter the initialization of the instance, with another value of one parameter."""
-        settings = self.settings | ({changed.variable: value} if changed else {})
+        settings = self.settings | ({changed.variable: changed.value + change} if changed else {})
         self.instance.restart()
         stop = self.stop + 2.0 * self.tolerance
         self.instance.enter_initialization(settings.items(), self.start, stop, TIGHTER * self.spec.rtol)
@@ -332,7 +309,7 @@ class VariationalRun:
             if (low is not None and value < low) or (high is not None and value > high):
                 return None
         try:
-            self.initialize(known, known.value + change if known else 0.0)
+            self.initialize(known, change)
             self.fmu.exitInitializationMode()
             update_discrete_states(self.update, self.start)
             self.fmu.enterContinuousTimeMode()
@@ -340,7 +317,7 @@ class VariationalRun:
             if known is None:
                 raise
             return None
-        return self.read("GetEventIndicators", self.q)
+        return self.read("getEventIndicators", self.q)
 
     def find_side(self, known: Known) -> int | None:
         """Return which neighbouring values of a parameter the FMU takes, as `Known.side`."""
@@ -392,11 +369,11 @@ class VariationalRun:
             jumps = [known for known in moved if known.input < 0 and self.starts_otherwise(known, base)]
             self.initialize()
         self.fmu.exitInitializationMode()
-        before = self.read("GetContinuousStates", self.n)
+        before = self.read("getContinuousStates", self.n)
         self.run.next_event = update_discrete_states(self.update, self.start)
         self.fmu.enterContinuousTimeMode()
-        self.y[:] = self.read("GetContinuousStates", self.n)
-        self.arrays["nominals"][: self.n] = self.read("GetNominalsOfContinuousStates", self.n)
+        self.y[:] = self.read("getContinuousStates", self.n)
+        self.arrays["nominals"][: self.n] = self.read("getNominalsOfContinuousStates", self.n)
         run = self.run
         run.t, run.h, run.next, run.n_steps, run.n_rhs = self.start, 1e-3 * (self.stop - self.start), 0, 0, 0
         run.is_fresh, run.last_t, run.n_at_once = False, self.start, 0
