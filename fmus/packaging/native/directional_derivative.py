@@ -45,15 +45,13 @@ class Tangent:
 
 
 def tangent_fields(declared: Variables) -> dict[str, str]:
-    """Return the attribute of Tangent for each variable that has one."""
-    fields = {name: name if name.isidentifier() else f"_{n}" for n, (name, _) in enumerate(declared)}
-    return {name: fields[name] for name, meaning in declared if has_tangent(name, meaning)}
-
-
-def has_tangent(name: str, meaning: Any) -> bool:
-    """Check whether a declared variable has a derivative or others have one by it."""
-    is_real = meaning.type == "Real" and meaning.causality in ("input", "output", "parameter")
-    return is_real or name.startswith(DERIVATIVE_NAME[:4])
+    """Return the attribute of Tangent for each variable that has a derivative, or by which others have one."""
+    return {
+        name: name if name.isidentifier() else f"_{n}"
+        for n, (name, meaning) in enumerate(declared)
+        if (meaning.type == "Real" and meaning.causality in ("input", "output", "parameter"))
+        or name.startswith(DERIVATIVE_NAME[:4])
+    }
 
 
 def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, dict[str, FunctionType]]:

@@ -237,13 +237,10 @@ static Status check_value(Instance *self, uint32_t reference, double value)
     return reason == OK ? STATUS_OK : refuse_value(self, reason, variable, value);
 }
 
-/* Tangents of constants change with the parameters. */
-static void forget_directions(Instance *self) { memset(self->has_direction, 0, sizeof self->has_direction); }
-
 static void replace_state(Instance *self, const State *state)
 {
     memcpy(&self->state, state, sizeof *state);
-    forget_directions(self);
+    memset(self->has_direction, 0, sizeof self->has_direction);
 }
 
 /* Set a variable to a valid value. */
@@ -253,7 +250,7 @@ static Status write_value(Instance *self, uint32_t reference, double value)
     const Variable *variable = &variables[reference];
     bool fault = false;
     if (has_value(state, variable, value)) return STATUS_OK;
-    if (!variable->is_state_or_input) forget_directions(self);
+    if (!variable->is_state_or_input) memset(self->has_direction, 0, sizeof self->has_direction);
     state->run.outputs_current = false;
     call_sequence_note_change(&state->run, &state->model, &fault);
     if (fault) return fail_run(self, DIVERGED, NAN, NAN);
