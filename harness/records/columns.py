@@ -20,6 +20,8 @@ from .units import DATE_NAME, TIME_NAME, TIMES, find_unit, order_from_name, spli
 MAX_PLAUSIBLE_TIME = 1e11  # s: the year 5138
 EXPONENT = re.compile("[dD](?=[-+0-9])")  # Fortran
 
+MAX_LISTED = 8  # columns in a note: more say nothing to a reader
+
 
 @dataclass(frozen=True)
 class ColumnOptions:
@@ -173,6 +175,15 @@ def find_time_column(table: Table, candidates: Sequence[Column], columns: Column
         return None
     may_be_index = not any(table.column_headings) and columns.rate is None
     return None if may_be_index and (t == np.round(t)).all() else first
+
+
+def describe_choice(column: Column, rivals: Sequence[Column], reason: str, option: str) -> list[str]:
+    """Return a note on the choice of a column of several; none of one."""
+    if len(rivals) < 2:
+        return []
+    names = [part.heading for part in rivals]
+    listed = ", ".join(names) if len(names) <= MAX_LISTED else f"{', '.join(names[:MAX_LISTED])} and others"
+    return [f"Of {listed}, {column.heading} is used, because {reason}; {option_text(option)} selects another."]
 
 
 def find_time_columns(candidates: Sequence[Column]) -> list[Column]:

@@ -14,6 +14,7 @@ from ..errors import SceneError, format_value, option_text
 from .columns import (
     Column,
     ColumnOptions,
+    describe_choice,
     find_column_and_unit,
     find_time_column,
     find_time_columns,
@@ -85,7 +86,16 @@ def extract_curve(name: str, table: Table, options: ColumnOptions, columns: Curv
     }
     units = {POSITION: velocity_unit.removesuffix("/s"), VELOCITY: velocity_unit, FORCE: unit}
     samples = extract(name, table, axis, candidates, sources, units, options)
-    return replace(samples, notes=(*table.notes, *motion_notes, *force_notes, *samples.notes))
+    runs = find_time_columns(candidates)[1:]  # another remark names their columns
+    others = [part for part in candidates if part not in (motion, force, axis.column) and not runs]
+    forces = [part for part in others if (is_force_unit(part.unit) if part.unit else FORCE_NAME.search(part.name))]
+    choice = []
+    if columns.velocity is None and columns.position is None:
+        motions = [part for part in others if part.order == motion.order and part not in forces]
+        choice += describe_choice(motion, [motion, *motions], "it comes first", "velocity")
+    if columns.force is None and columns.current is None and not is_current:
+        choice += describe_choice(force, [force, *forces], "it has the unit or name of one", "force")
+    return replace(samples, notes=(*table.notes, *choice, *motion_notes, *force_notes, *samples.notes))
 
 
 def check_options(columns: CurveColumns) -> None:

@@ -12,6 +12,7 @@ from ..errors import SceneError, command_text, option_text
 from .columns import (
     Column,
     ColumnOptions,
+    describe_choice,
     find_column,
     list_columns,
     no_time_message,
@@ -91,7 +92,8 @@ def find_signal_column(
     """Return the motion column and notes on the choice.
 
     A position is preferred to a velocity or an acceleration. Of several, the one with the largest deviation is chosen,
-    with units and without; columns that only rise or only fall, as counters do, are chosen last.
+    with units and without; columns that only rise or only fall, as counters do, are chosen last.  The note names the
+    others, and columns that neither their unit nor their name excludes.
     """
     if columns.column is not None:
         return find_column(columns.column, table, candidates), []
@@ -108,16 +110,17 @@ def find_signal_column(
     motions = [part for part in others if part.order == order]
     motions = [part for part in motions if not MAGNITUDE_NAME.search(part.name)] or motions or others
     same_unit = [part for part in motions if part.unit == motions[0].unit]
-    if len(same_unit) == 1 or (order == 0 and same_unit[0].name.lower() in ("x", "theta")):
-        return same_unit[0], []
+    unknown = [part for part in others if part.order is None and not part.unit and part not in motions]
+    rivals = [*motions, *unknown]
+    if order == 0 and same_unit[0].name.lower() in ("x", "theta"):
+        return same_unit[0], describe_choice(same_unit[0], rivals, "its name is that of a position", "column")
+    if len(same_unit) == 1:
+        reason = "it comes first" if order is None else f"it has the name or unit of {with_article(QUANTITIES[order])}"
+        return same_unit[0], describe_choice(same_unit[0], rivals, reason, "column")
     samples = [parse_numbers(table, part.index, strict=False) for part in same_unit]
     swings = [x if np.any(np.diff(x) < 0) and np.any(np.diff(x) > 0) else np.zeros(1) for x in samples]  # no counter
     most_varying = same_unit[int(np.argmax([np.nanstd(x) for x in swings]))]
-    names = ", ".join(part.heading for part in same_unit)
-    note = (
-        f"Of {names}, {most_varying.heading} is used, because it varies most; {option_text('column')} selects another."
-    )
-    return most_varying, [note]
+    return most_varying, describe_choice(most_varying, rivals, "it varies most", "column")
 
 
 def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str) -> tuple[int, str, float, str]:

@@ -361,6 +361,25 @@ def test_of_several_columns_the_one_that_varies_most_is_used(tmp_path, headings,
     assert [text for text in record.notes if re.match(note, text)]
 
 
+@pytest.mark.parametrize(
+    ("headings", "note"),
+    [
+        ("t,a,b", "Of a, b, a is used, because it has the name or unit of an acceleration; `column` selects another."),
+        ("t,x,b", "Of x, b, x is used, because its name is that of a position; `column` selects another."),
+        ("t [s],x [m],y [mm]", "Of x [m], y [mm], x [m] is used, because its name is that of a position; "),
+        ("t [s],x [m],v [m/s]", ""),
+    ],
+)
+def test_a_choice_by_name_or_unit_names_what_else_may_be_the_motion(tmp_path, headings, note):
+    path = tmp_path / "record.csv"
+    path.write_text(f"{headings}\n" + rows(T, X, 2 * X))
+    record = read_record(path)
+    assert record.x == pytest.approx(X, abs=1e-9)
+    choices = [text for text in record.notes if "selects another" in text]
+    assert len(choices) == bool(note)
+    assert not note or choices[0].startswith(note)
+
+
 def test_a_column_that_does_not_move_is_named_with_the_others(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [s],x [m],v [m/s]\n" + rows(T, 0 * X, X))
