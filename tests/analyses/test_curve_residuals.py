@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 from variants import slow_after
 
 import harness
-from benchmarks.campaigns.hidden_defects import preslide
+from benchmarks.campaigns.hidden_defects import curve_record, preslide
 
 T = np.arange(0, 40.0, 0.005)
 V = 0.2 * np.sin(2 * np.pi * 2 * T / 40)
@@ -101,6 +101,14 @@ def test_standstill_that_does_not_read_zero_is_no_sliding(heading, measure, note
     assert curve["F_v"].value == pytest.approx(0.8, abs=0.07)
     assert_covers(curve, 1.5, F_c=2.0, F_v=0.8)
     assert curve.used.all()
+
+
+@pytest.mark.parametrize("seed", slow_after(1, [7, 16]))
+def test_intervals_contain_what_the_steps_of_a_code_without_zero_hide(seed):
+    """Each of these records missed a constant by several half widths."""
+    record, truth = curve_record(np.random.default_rng((seed, 4)), "code")
+    curve = harness.identify_curve(record, mass=1e-9)
+    assert all(item.low <= truth[item.name][0] <= item.high for item in curve.estimates)
 
 
 def test_pauses_do_not_replace_the_samples_that_move():

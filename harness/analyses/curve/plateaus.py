@@ -74,7 +74,7 @@ def build_points(record: Samples, mass: float | None, backlash: float) -> CurveP
         labels = tuple(f"row {row}" for row in record.rows)
         return CurvePoints(record.name, record.columns[VELOCITY], record.columns[FORCE], *units, labels, record.notes)
     blocks = build_blocks(record, MAX_BLOCKS)
-    offset, rest, notes = find_standstill(record, blocks, units[0])
+    offset, rest, half_step, notes = find_standstill(record, blocks, units[0])
     blocks = replace(blocks, v=blocks.v - offset, rest=rest)
     travelled = find_travel(blocks)
     is_usable = travelled > backlash
@@ -94,7 +94,7 @@ def build_points(record: Samples, mass: float | None, backlash: float) -> CurveP
         note = "The record has no plateaus of constant velocity: neighbouring samples are averaged" + (
             "." if mass else ", and inertia is not removed, because the mass is not given."
         )
-    return replace(points, notes=(*record.notes, *notes, note))
+    return replace(points, notes=(*record.notes, *notes, note), half_step=half_step)
 
 
 def build_blocks(record: Samples, max_blocks: int) -> Blocks:
@@ -117,8 +117,10 @@ def build_blocks(record: Samples, max_blocks: int) -> Blocks:
     return Blocks(times, v, force.mean(axis=1), np.gradient(v, times), noise)
 
 
-def find_standstill(record: Samples, blocks: Blocks, unit: str) -> tuple[float, float, list[str]]:
-    """Return the velocity that standstill reads, the largest speed at standstill, and a note if the first is not zero.
+def find_standstill(record: Samples, blocks: Blocks, unit: str) -> tuple[float, float, float, list[str]]:
+    """Return the velocity that standstill reads, the largest speed at standstill, half a step of the code, and a note.
+
+    Half a step is 0 if the code has a zero, and there is no note if standstill reads zero.
 
     Standstill is a low velocity that recurs whatever the force; the force of a sliding body recurs with its velocity.
     """
@@ -129,9 +131,9 @@ def find_standstill(record: Samples, blocks: Blocks, unit: str) -> tuple[float, 
             note = (
                 f"The velocity has steps of {step:.3g} {unit} and no code for zero: standstill reads plus or minus "
                 f"{smallest:.3g} {unit}, and samples with this speed are left out. Each other speed may be off by "
-                "as much, which the intervals of F_s and v_s do not contain."
+                "as much, which widens the intervals."
             )
-            return 0.0, smallest * (1 + SAME_CODE), [note]
+            return 0.0, smallest * (1 + SAME_CODE), smallest, [note]
     v, force, fastest = blocks.v, blocks.force, float(np.abs(blocks.v).max())
     width = max(STANDSTILL * fastest, NOISE_BAND * blocks.noise)
     is_level = np.append(np.abs(np.diff(v)) <= width, False) & (np.abs(v) < MAX_OFFSET * fastest)
@@ -146,9 +148,9 @@ def find_standstill(record: Samples, blocks: Blocks, unit: str) -> tuple[float, 
     members = best[1]
     offset = float(np.median(v[members])) if len(members) else 0.0
     if abs(offset) <= width / NOISE_BAND:
-        return 0.0, 0.0, []
+        return 0.0, 0.0, 0.0, []
     note = f"Standstill reads {offset:.3g} {unit} whatever the force: this offset is subtracted from the velocity."
-    return offset, width, [note]
+    return offset, width, 0.0, [note]
 
 
 def find_travel(blocks: Blocks) -> np.ndarray:

@@ -48,6 +48,8 @@ class CurvePoints:
         Half of the change (n,) of the velocity within a point of a sweep; empty otherwise, as the next ones.
     a, slope, travelled : numpy.ndarray
         Accelerations (n,), rates of the force in N/s, and distances since the last reversal in m or rad.
+    half_step : float
+        Half a step of a velocity whose code has no zero; 0 otherwise.
     """
 
     name: str
@@ -62,6 +64,7 @@ class CurvePoints:
     a: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
     slope: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
     travelled: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    half_step: float = 0.0
 
     def select(self, mask: np.ndarray) -> Self:
         """Return the points of a mask (n,)."""
