@@ -9,24 +9,20 @@ from scipy.stats import norm
 
 import harness
 from harness.analyses.decay.intervals import (
-    N_DRAWS,
     confidence_interval,
     estimate_uncertainty,
     nonnegative_interval,
-    quasirandom_normal,
 )
 
 T0, REST, OMEGA, ZETA = 0, 2, 4, 5  # in the order of the unknowns
 
 
-def test_nonnegative_intervals_cover_95_percent():
-    """Checked with the probabilities of a normal distribution, for each mean and each measured value."""
-    step = 0.04
-    z = np.arange(-4.0, 9.0, step)
-    low, high = np.array([nonnegative_interval(np.array([item]), np.eye(1)) for item in z]).T
-    for mean in (0.0, 0.3, 1.0, 2.0, 3.0, 5.0):
-        share = step * np.sum(norm.pdf(z - mean)[(low <= mean) & (mean <= high)])
-        assert share == pytest.approx(0.95, abs=0.004), mean
+def test_a_single_interval_is_that_of_the_likelihood_ratio():
+    """The accepted means m fulfil (z - m)^2 <= 1.96^2 + min(z, 0)^2, and are not negative."""
+    for z in (-3.0, -0.4, 0.0, 1.0, 1.95, 4.0):
+        half = np.hypot(norm.ppf(0.975), min(z, 0.0))
+        expected = (max(z - half, 0.0), z + half)
+        assert nonnegative_interval(np.array([z]), np.eye(1)) == pytest.approx(expected, abs=2e-4)
 
 
 @pytest.mark.slow
@@ -42,11 +38,11 @@ def test_nonnegative_intervals_cover_95_percent():
     ],
 )
 def test_joint_nonnegative_intervals_cover_95_percent(means, rho):
-    """Of 200 draws; more only where both are zero, where the interval is shorter for it."""
+    """Of 400 draws; more at zero, where the interval is shorter for it."""
     correlation = np.array([[1.0, rho], [rho, 1.0]])
-    z = np.random.default_rng(1).multivariate_normal(means, correlation, 200)
+    z = np.random.default_rng(1).multivariate_normal(means, correlation, 400)
     low, high = np.array([nonnegative_interval(item, correlation) for item in z]).T
-    assert 0.9 < np.mean((low <= means[0]) & (means[0] <= high)) < (1.0 if means == (0.0, 0.0) else 0.985)
+    assert np.mean((low <= means[0]) & (means[0] <= high)) > 0.92
     if means == (0.0, 0.0) and rho < 0:
         single = np.array([nonnegative_interval(item[:1], np.eye(1)) for item in z])
         assert np.mean(high) < 0.5 * np.mean(single[:, 1])
@@ -69,18 +65,6 @@ def test_intervals_of_few_samples_are_those_of_student(freedom, quantile):
     """Quantiles at 97.5 % of a printed table."""
     low, high = confidence_interval(0, np.array([OMEGA]), np.array([5.0]), np.array([0.1]), np.eye(1), freedom)
     assert (low, high) == pytest.approx((5.0 - 0.1 * quantile, 5.0 + 0.1 * quantile), abs=1e-5)
-
-
-def test_the_draws_are_those_of_the_additive_recurrence_of_roberts():
-    """Its generator is the root of g^(k + 1) = g + 1; the draws begin with its first multiple and fill the interval."""
-    for k in (1, 2, 3):
-        g = max(root.real for root in np.roots([1, *[0] * (k - 1), -1, -1]) if abs(root.imag) < 1e-12)
-        uniform = norm.cdf(quasirandom_normal(k))
-        assert uniform.shape == (k, N_DRAWS)
-        for i, row in enumerate(uniform, 1):
-            assert row[0] == pytest.approx((0.5 + g**-i) % 1, abs=1e-12)
-            assert row[-1] == pytest.approx((0.5 + N_DRAWS * g**-i) % 1, abs=1e-9)
-            assert np.abs(np.sort(row) - (np.arange(N_DRAWS) + 0.5) / N_DRAWS).max() < 10 / N_DRAWS
 
 
 def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():

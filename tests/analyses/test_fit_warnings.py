@@ -72,7 +72,7 @@ def test_errors_of_a_solver_are_named_as_a_cause_of_losses(method, rtol, is_name
     [
         (
             decay_record(0.01, noise=1e-4).x + 0.04 * np.sin(7.3 * T),
-            "not a free decay of one oscillator|grows, from .* peak to peak",
+            "not a free decay of one oscillator|driven or gains energy",
         ),
         (0.05 * np.cos(OMEGA * T) + 0.05 * np.exp(-T) * np.cos(9 * T), "beats: its swings fall to"),
         (np.random.default_rng(1).standard_normal(1000), "all noise"),
@@ -112,10 +112,8 @@ def test_a_drift_too_large_to_fit_is_reported_with_a_remedy(sine, order, drift, 
     record = decay_record(
         0.01, sine=sine, drift=drift * size, noise=1e-3 * size, order=order, turn=0.0, t=np.linspace(0, 5, 450)
     )
-    with pytest.raises(HarnessError, match="over the record: add drift=True") as refusal:
+    with pytest.raises(HarnessError, match="add drift=True if the rest position drifts"):
         identify(record, pendulum=sine, drag=drag)
-    over = float(str(refusal.value).split("drifts by ")[1].split()[0])
-    assert over == pytest.approx(5 * drift * size, rel=0.02)
 
 
 def angular_acceleration(a, noise=0.05):

@@ -67,7 +67,7 @@ IDENTIFY_DECAY = [
     ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "pendulum": True}, "pendulum=True needs an angle"),
     (
         {"record": DECAY[0], "x": DECAY[0] % 3.0, "unit": "m"},
-        "use harness.fit('stickslip', ...), or select a free decay",
+        "use harness.fit('stickslip', ...) for a driven motion",
     ),
 ]
 CURVE = [  # changes of harness.identify_curve of forces over velocities

@@ -70,7 +70,7 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     (["run", "nosuch"], 2, "unknown model or scene 'nosuch'"),
     *((arguments, 2, f"{option} has no effect ") for arguments, option in OPTIONS_WITHOUT_EFFECT),
     (["compare", "fmus", OWN], 2, "trajectory.csv is missing"),
-    (["decay", "stickslip"], 1, "as in stick-slip, and is no decay"),
+    (["decay", "stickslip"], 1, "fit stickslip for a driven motion"),
     (["decay", "line.csv", "--k", 1, "--mass", 1], 2, "--k and --mass"),
     ([*FIT, "--free", "k=3"], 2, "--free k=3: give a range, as in k=0.1:2, or fix it by --set k=3"),
     ([*FIT, "--free", "k=3:x"], 2, "--free k=3:x: 'x' is not a finite number"),

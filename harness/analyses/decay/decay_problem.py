@@ -6,7 +6,7 @@ squares is minimised by scipy over some of the unknowns, with nonnegative losses
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Self
 
@@ -73,9 +73,6 @@ class DecayProblem:
     drift: bool
     half_period: float
     quantiser_step: float
-    cache: dict[tuple[bytes, Terms], tuple[np.ndarray, np.ndarray]] = field(
-        default_factory=dict, init=False, repr=False
-    )
 
     @property
     def residual_floor(self) -> float:
@@ -114,13 +111,8 @@ class DecayProblem:
         change = p[OMEGA] * self.half_period / np.pi
         if not 1 / thresholds.MAX_FREQUENCY_CHANGE < change < thresholds.MAX_FREQUENCY_CHANGE:
             return np.full(len(self.t), np.nan), np.full((len(self.t), len(self.unknowns(terms))), np.nan)
-        key = p.tobytes(), terms
-        if key not in self.cache:
-            signal, jacobian = self.model(p, self.unknowns(terms), self.t)
-            self.cache[key] = signal - self.x, jacobian
-            if len(self.cache) > 2:
-                del self.cache[next(iter(self.cache))]
-        return self.cache[key]
+        signal, jacobian = self.model(p, self.unknowns(terms), self.t)
+        return signal - self.x, jacobian
 
     def fit(self, p: np.ndarray, terms: Terms, max_steps: int = 30) -> Minimum:
         """Fit the law with these terms, from the starting values p."""
@@ -277,14 +269,23 @@ def least_squares(
 
     @lru_cache(maxsize=2)
     def evaluate(values: bytes) -> tuple[np.ndarray, np.ndarray, int]:
-        """Return the problem at these values of the unknowns, compressed, and its number of residuals."""
-        q = p.copy()
+        """Return residuals and Jacobian with the same sums of squares and products, and the number of residuals.
+
+        Their k + 1 rows are faster to decompose; einsum needs no threads for them, unlike BLAS.  scipy refuses a step
+        to values that are not finite.
+        """
+        q, refused = p.copy(), np.full((len(unknowns) + 1, len(unknowns)), np.nan)
         q[unknowns] = np.frombuffer(values)
         if not (np.array_equal(q, p) or is_admissible(q, p)):  # before its cost, which may be large
-            return *no_values(len(unknowns)), 0
+            return refused[:, 0], refused, 0
         r, jacobian = residual(q)
-        residuals, slopes = compress(r, jacobian) if jacobian.any() else no_values(len(unknowns))
-        return residuals, slopes, len(r)
+        rows = np.column_stack([jacobian, r])
+        if not jacobian.any() or not np.isfinite(rows).all():
+            return refused[:, 0], refused, len(r)
+        scale = column_norms(rows)
+        sizes, axes = np.linalg.eigh(np.einsum("ij,ik->jk", rows / scale, rows / scale))
+        root = np.sqrt(np.maximum(sizes, 0.0))[:, None] * axes.T * scale
+        return root[:, -1], root[:, :-1], len(r)
 
     lowest = np.where(unknowns >= ZETA, 0.0, -np.inf)
     with np.errstate(all="ignore"):
@@ -320,28 +321,6 @@ def least_squares(
         return r, jacobian[:, ~is_zero]
 
     return least_squares(residual_of_others, p, unknowns[~is_zero], max_steps)
-
-
-def compress(r: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return residuals (k + 1,) and a Jacobian (k + 1, k) with the same sums of squares and products.
-
-    scipy decomposes these small matrices faster.  If one value is not finite, no residual is, and scipy refuses the
-    step.
-    """
-    both = np.column_stack([jacobian, r])
-    scale = column_norms(both)
-    both /= scale
-    products = both.T @ both
-    if not np.isfinite(products).all():
-        return no_values(len(scale) - 1)
-    eigenvalues, axes = np.linalg.eigh(products)
-    root = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * axes.T * scale
-    return root[:, -1], root[:, :-1]
-
-
-def no_values(k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return NaN for the compressed residuals (k + 1,) and Jacobian (k + 1, k), which scipy refuses."""
-    return np.full(k + 1, np.nan), np.full((k + 1, k), np.nan)
 
 
 def column_norms(jacobian: np.ndarray) -> np.ndarray:

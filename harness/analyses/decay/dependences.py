@@ -8,52 +8,27 @@ the sides adds the second harmonic of u, in proportion to the square of the ampl
 With the friction r + d exp(-|v|/v_s) a half cycle of amplitude a loses more energy, 2 a d h(u) for the ratio u of its
 peak speed to v_s, where h(u) = 1/2 int exp(-u sin phi) sin phi dphi over [0, pi].  To first order in d, this lost
 amplitude decays as every small change of the amplitude does, so the signal changes by a known function of time times d.
+This function is one effect for each of several v_s.
 
 The coefficients of each cause are normal with one variance, which follows from the restricted likelihood of the scores
 of the residuals, the most likely cause first, and the others from what is left.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
 
-from ..estimation.estimate import NORMAL_QUANTILE, block_scores
 from . import thresholds
 from .decay_problem import DecayProblem, column_norms
-from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, UNKNOWNS, ZETA, R, Terms, unit_scales
+from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, ZETA, Terms
 
 CAUSES = {
     "phase": "a clock whose rate varies",
     "amplitude": "a loss that follows another law",
     "rest": "a sensor that drifts",
     "direction": "a spring or a sensor that differs between the sides",
+    "speed": "friction that rises at low speed",
 }
-
-
-@dataclass(frozen=True)
-class LowSpeedRise:
-    """A rise of friction at low speed, in the units of the record.
-
-    Attributes
-    ----------
-    speed : float
-        Speed v_s relative to the peak speed of the first half cycle.
-    size : float
-        Friction at standstill less that at high speed, over stiffness.
-    losses : dict
-        Ranges of the losses by name, with a rise of this size up to the end of its interval, for all speeds shown.
-    is_shown : bool
-        Whether the record shows the rise; without friction at high speed it would be no rise.
-    limit : float
-        Rise with a v_s of LIMIT_SPEED that the record would show in five of six cases; infinite if any may be hidden.
-    """
-
-    speed: float
-    size: float
-    losses: dict[str, tuple[float, float]]
-    is_shown: bool
-    limit: float
 
 
 @dataclass(frozen=True)
@@ -66,25 +41,27 @@ class Dependences:
         Root mean square of the displacement by each proven cause, in the unit of the fit, by its name in CAUSES.
     variances : numpy.ndarray
         Variances (k,) that these add to those of the unknowns.
-    rise : LowSpeedRise or None
-        Rise of friction at low speed; None if there are too few half cycles.
     """
 
     sizes: dict[str, float]
     variances: np.ndarray
-    rise: LowSpeedRise | None
 
 
 def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Dependences:
-    """Return on what the residuals of the fitted values p of a law with these terms depend."""
+    """Return on what the residuals of the fitted values p of a law with these terms depend.
+
+    A loss of zero is at its bound, so that it hides no effect that a negative loss would follow.
+    """
     e, jacobian = problem.residuals(p, terms)
     e, width = -e, quarter_width(problem, p)
     scale = column_norms(jacobian)
     inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-14) / np.outer(scale, scale)
-    rise, change = find_rise(problem, p, terms, e, jacobian)
     effects = signal_effects(problem, p, e, jacobian)
+    if "r" in terms and len(problem.half_cycles(p)[0]) >= thresholds.MIN_SPEED_HALF_CYCLES:
+        effects["speed"] = speed_effects(problem, p, terms, jacobian)
     sizes: dict[str, float] = {}
-    variances, columns = np.zeros(len(inverse)), np.column_stack([jacobian, change])
+    unknowns = problem.unknowns(terms)
+    variances, columns = np.zeros(len(inverse)), jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)]
     while effects:
         basis = orthonormal(columns)
         found = {name: effect_variance(effect, e, basis, width) for name, effect in effects.items()}
@@ -95,38 +72,7 @@ def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Depe
         variances += variance * ((inverse @ (jacobian.T @ effect)) ** 2).sum(axis=1)
         columns = np.column_stack([columns, effect])
         sizes[name] = float(np.sqrt(variance * np.mean((effect**2).sum(axis=1))))
-    return Dependences(sizes, variances, rise)
-
-
-def find_rise(
-    problem: DecayProblem, p: np.ndarray, terms: Terms, e: np.ndarray, jacobian: np.ndarray
-) -> tuple[LowSpeedRise | None, np.ndarray]:
-    """Return the rise of friction at low speed in residuals e (n,), None with few half cycles, and its change.
-
-    The change of the signal is (n, 1), or (n, 0) if the record shows no rise.
-    """
-    units = {UNKNOWNS.index(name): unit_scales(problem.scale)[UNKNOWNS.index(name)] for name in terms}
-    found, nothing, whole = {}, jacobian[:, :0], orthonormal(jacobian)
-    is_exact = float(np.sqrt(np.mean(e**2))) < thresholds.EXACT * p[AMPLITUDE]
-    for speed, change in rise_effects(problem, p, terms, jacobian).items():
-        size, values, is_free = fit_rise(problem, p, terms, e, jacobian, change)
-        error = coefficient_error(change, e, orthonormal(jacobian[:, is_free]))  # a loss at zero absorbs no rise
-        limit = (thresholds.SHOWN_RISE + 1) * coefficient_error(change, e, whole) * problem.scale
-        is_shown = not is_exact and thresholds.SHOWN_RISE * error < size < thresholds.MAX_RISE * values[R]
-        most = 1 + NORMAL_QUANTILE * error / max(size, error)
-        ends = {i: (values[i], p[i] + most * (values[i] - p[i])) for i in units}
-        losses = {UNKNOWNS[i]: (min(ends[i]) * unit, max(ends[i]) * unit) for i, unit in units.items()}
-        rise = LowSpeedRise(speed, size * problem.scale, losses, is_shown, limit)
-        found[speed] = is_shown * size / error, rise, change
-    if not found:
-        return None, nothing
-    _, rise, change = max(found.values(), key=lambda item: item[0])
-    stated = found[thresholds.LIMIT_SPEED][1]
-    if not rise.is_shown:
-        return stated, nothing
-    shown = [other.losses for _, other, _ in found.values() if other.is_shown]
-    losses = {name: (min(each[name][0] for each in shown), max(each[name][1] for each in shown)) for name in terms}
-    return replace(rise, losses=losses, limit=stated.limit), change
+    return Dependences(sizes, variances)
 
 
 def quarter_width(problem: DecayProblem, p: np.ndarray) -> int:
@@ -144,37 +90,6 @@ def noise_variance(e: np.ndarray, width: int, freedom: int) -> float:
     """Return the variance of residuals e (n,), or of their sums over `width` samples if these exceed white noise."""
     sums = np.add.reduceat(e, np.arange(0, len(e), width))
     return max(float(e @ e), float(sums @ sums) / width) / max(freedom, 1)
-
-
-def coefficient_error(column: np.ndarray, e: np.ndarray, basis: np.ndarray) -> float:
-    """Return the standard error of the coefficient of a column (n, 1) in residuals e (n,) beside a basis (n, k)."""
-    own, rest = (values - basis @ (basis.T @ values) for values in (column, e))
-    power = float(np.sum(own**2))
-    if not power > 0:
-        return np.inf
-    rest = rest - own[:, 0] * float(own[:, 0] @ rest) / power
-    variance = power * float(rest @ rest) / len(e)  # of the score
-    for count in thresholds.RISE_BLOCKS:
-        scores, factor = block_scores(own, rest, count, basis.shape[1] + 1)
-        variance = max(variance, float(np.sum(scores**2)) * factor)
-    return float(np.sqrt(variance)) / power
-
-
-def fit_rise(
-    problem: DecayProblem, p: np.ndarray, terms: Terms, e: np.ndarray, jacobian: np.ndarray, change: np.ndarray
-) -> tuple[float, list[float], np.ndarray]:
-    """Fit the law and a rise to residuals e (n,) by one linear step with losses that are not negative.
-
-    Returns the rise, the values of UNKNOWNS, and which of the unknowns (k,) are free.
-    """
-    columns, unknowns = np.column_stack([jacobian, change]), problem.unknowns(terms)
-    scale = column_norms(columns)
-    triangle = np.asarray(np.linalg.qr(np.column_stack([columns / scale, e]), mode="r"))
-    low = np.append(np.where(unknowns >= ZETA, -p[unknowns], -np.inf), 0.0) * scale
-    fit = optimize.lsq_linear(triangle[:, :-1], triangle[:, -1], (low, np.inf))
-    values = p.copy()
-    values[unknowns] += (fit.x / scale)[:-1]
-    return float(fit.x[-1] / scale[-1]), values.tolist(), np.asarray(fit.active_mask[:-1] == 0)
 
 
 def signal_effects(problem: DecayProblem, p: np.ndarray, e: np.ndarray, jacobian: np.ndarray) -> dict[str, np.ndarray]:
@@ -216,10 +131,8 @@ def effect_variance(effect: np.ndarray, e: np.ndarray, basis: np.ndarray, width:
     return float(ratios[best] * noise), float(likelihood[best] - likelihood[0])
 
 
-def rise_effects(problem: DecayProblem, p: np.ndarray, terms: Terms, jacobian: np.ndarray) -> dict[float, np.ndarray]:
-    """Return the change (n, 1) of the signal by a unit rise at each of RISE_SPEEDS; none with few half cycles."""
-    if "r" not in terms or len(problem.half_cycles(p)[0]) < thresholds.MIN_RISE_HALF_CYCLES:
-        return {}
+def speed_effects(problem: DecayProblem, p: np.ndarray, terms: Terms, jacobian: np.ndarray) -> np.ndarray:
+    """Return the changes (n, m) of the signal by a unit rise of friction at each of the m RISE_SPEEDS."""
     amplitudes, starts = problem.half_cycles(p)
     speeds, is_pendulum = np.array(thresholds.RISE_SPEEDS), problem.model.is_pendulum
     slope = jacobian[:, np.flatnonzero(problem.unknowns(terms) == AMPLITUDE)[0]]
@@ -233,7 +146,4 @@ def rise_effects(problem: DecayProblem, p: np.ndarray, terms: Terms, jacobian: n
     force = np.sinc(middle / np.pi) if is_pendulum else np.ones_like(middle)  # sin a/a
     lost = 2 * share / force[:, None] / sensitivity
     total = np.concatenate([np.zeros((1, len(speeds))), -np.cumsum(lost, axis=0)])
-    return {
-        speed: (slope * np.interp(problem.t, starts, column))[:, None]
-        for speed, column in zip(speeds.tolist(), total.T, strict=True)
-    }
+    return np.stack([slope * np.interp(problem.t, starts, column) for column in total.T], axis=1)

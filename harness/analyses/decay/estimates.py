@@ -7,42 +7,34 @@ clear.
 From all turning points, for comparison: their positions x_i = rest +- a_i, fitted by the return map of the law (for a
 spring without drag a_(i+1) = e a_i - (1 + e) r: B. F. Feeny, J. W. Liang, Journal of Sound and Vibration 195 (1996)).
 
-From the first and the last turning point: the single loss that leads from the first amplitude to the last.  For a
-spring this is the textbook's logarithmic decrement or linear envelope; for a pendulum it comes from the return map.
+From the first and the last turning point: the single loss that leads from the first amplitude to the last, by the
+textbook's logarithmic decrement or linear envelope.  A pendulum is taken for the spring with the same energies, whose
+amplitude is 2 sin(a/2), and the loss by drag for a small one.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
 
 from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from .decay_problem import DecayProblem, column_norms, least_squares
-from .dependences import LowSpeedRise
 from .intervals import FitUncertainty, confidence_interval, extend_interval, to_correlation
 from .law import (
     AMPLITUDE,
     DRIFT,
     OMEGA,
     REST,
-    TERMS,
     UNKNOWNS,
     ZETA,
     B,
     R,
     damping_ratio,
     friction_from_envelope,
-    iterate_return_map,
     unit_scales,
 )
 from .model_selection import FittedLaw
 from .samples import Extrema
-from .signal_model import LAW
-
-PRECISION = 1e-12  # relative to a small loss, of the single loss
-BRACKET = (2.0, 4.0, 8.0)  # times a small loss: upper ends of the search for the single loss
-STOPPED = 1e-6  # of the first amplitude: a root that misses the last amplitude by more is not a solution
 
 
 @dataclass(frozen=True)
@@ -133,17 +125,6 @@ def make_estimates(
     return estimates
 
 
-def widen_losses(estimates: dict[int, Estimate], rise: LowSpeedRise) -> dict[int, Estimate]:
-    """Return the estimates; the intervals of the losses cover those with a rise of friction at low speed too."""
-    widened = dict(estimates)
-    for unknown, estimate in estimates.items():
-        if estimate.name in rise.losses:
-            least, most = (loss - estimate.value for loss in rise.losses[estimate.name])
-            low, high = max(estimate.low + min(least, 0.0), 0.0), estimate.high + max(most, 0.0)
-            widened[unknown] = replace(estimate, error=max(estimate.error, -least, most), low=low, high=high)
-    return widened
-
-
 def force_estimates(
     record: Motion, omega: Estimate, estimates: dict[int, Estimate], parameters: KnownParameters
 ) -> tuple[Estimate, ...]:
@@ -228,48 +209,15 @@ def estimate_from_two_peaks(
         return (), "the rest position drifts"
     if not first > last:
         return (), "the last turning point is no smaller than the first"
-    estimates = {}
-    for term in TERMS:
-        unknown = UNKNOWNS.index(term)
-        value = solve_single_loss(
-            unknown, first / problem.scale, last / problem.scale, count, problem.model.is_pendulum
-        )
-        if np.isfinite(value):
-            estimates[unknown] = to_record_units(record, problem, unknown, value, np.nan, np.nan, np.nan)
-    return (*estimates.values(), *force_estimates(record, omega, estimates, parameters)), ""
-
-
-def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pendulum: bool) -> float:
-    """Return the single loss that leads from one amplitude to another in `count` half cycles; NaN if none does.
-
-    For a spring with damping or friction it has a closed form; otherwise the search starts from that of a small loss.
-
-    Parameters
-    ----------
-    unknown : int
-        Index in UNKNOWNS of the loss: ZETA, R or B.
-    first, last : float
-        Amplitudes, in one unit.
-    """
-    small_loss = {
+    if problem.model.is_pendulum:
+        first, last = (2 * float(np.sin(amplitude / 2)) for amplitude in (first, last))
+    losses = {
         ZETA: damping_ratio(first, last, count / 2),
-        R: friction_from_envelope(first, last, count / 2, 1.0),
-        B: 0.75 * (1 / last - 1 / first) / count,
-    }[unknown]
-    if unknown != B and not is_pendulum:
-        return small_loss
-    p = np.zeros(len(UNKNOWNS))
-    p[[AMPLITUDE, OMEGA]] = first, 1.0
-
-    def excess(loss: float) -> float:
-        """Return the excess of the last amplitude with this loss; the amplitude is 0 if the motion stops before."""
-        p[unknown] = loss
-        amplitudes = iterate_return_map(p[None, LAW], is_pendulum, 0.0, count).amplitudes[:, 0]
-        return float(amplitudes[-1]) - last if len(amplitudes) > count else -last
-
-    for factor in BRACKET:
-        if excess(factor * small_loss) < 0:
-            loss = float(optimize.brentq(excess, 0.0, factor * small_loss, xtol=PRECISION * small_loss))
-            # the amplitude falls suddenly to zero at a loss with which the motion stops before
-            return loss if abs(excess(loss)) < STOPPED * first else np.nan
-    return np.nan
+        R: friction_from_envelope(first, last, count / 2, 1.0) / problem.scale,
+        B: 0.75 * (1 / last - 1 / first) / count * problem.scale,
+    }
+    estimates = {
+        unknown: to_record_units(record, problem, unknown, value, np.nan, np.nan, np.nan)
+        for unknown, value in losses.items()
+    }
+    return (*estimates.values(), *force_estimates(record, omega, estimates, parameters)), ""

@@ -38,8 +38,6 @@ class FreeMotion:
         Sum of squares of their residuals.
     outliers : int
         Number of samples left out as outliers.
-    whole : tuple of DecayProblem and numpy.ndarray, optional
-        Samples and values before a part that departs from the law was left out.
     notes : tuple of str
         Sentences on other samples left out.
     """
@@ -52,7 +50,6 @@ class FreeMotion:
     p: np.ndarray
     sum_of_squares: float = np.inf
     outliers: int = 0
-    whole: tuple[DecayProblem, np.ndarray] | None = None
     notes: tuple[str, ...] = ()
 
     def fit(self, problem: DecayProblem, p: np.ndarray | None = None) -> Self:
@@ -90,7 +87,6 @@ def select_free_motion(record: Motion, extrema: Extrema, terms: Terms, pendulum:
         truncate_at_stop,
         remove_outliers,
         skip_disturbed_start,
-        skip_disturbed_turns,
         truncate_at_disturbance,
         estimate_final_noise,
     ):
@@ -122,12 +118,11 @@ def skip_before_start(motion: FreeMotion) -> FreeMotion:
     return replace(motion, available=released, problem=released)
 
 
-def fit_certain_samples(motion: FreeMotion, has_search: bool = True) -> FreeMotion:
+def fit_certain_samples(motion: FreeMotion) -> FreeMotion:
     """Fit the samples up to the last turning point, with a search if the fit leaves more than noise."""
     problem, extrema = motion.available, motion.extrema
     last = extrema.t[-1] - problem.time_origin + thresholds.CERTAIN_TIME * extrema.half_period
-    certain = problem.subset(problem.t <= last)
-    return motion.search(certain) if has_search else motion.fit(certain)
+    return motion.search(problem.subset(problem.t <= last))
 
 
 def truncate_at_stop(motion: FreeMotion) -> FreeMotion:
@@ -167,48 +162,27 @@ def remove_outliers(motion: FreeMotion) -> FreeMotion:
 
 
 def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
-    """Start at the first turning point if the half cycle before it is not a free motion."""
-    problem, e = motion.problem, motion.residuals()
-    _, starts = problem.half_cycles(motion.p, max_count=1)
-    first = problem.t < starts[-1]
-    if len(starts) < 2 or not 3 <= first.sum() < len(e) - 12:
-        return motion
-    rest = float(np.sqrt(np.mean(e[~first] ** 2)))
-    expected_rms = max(problem.noise, rest, problem.residual_floor)
-    if not np.sqrt(np.mean(e[first] ** 2)) > thresholds.DISTURBED_START * expected_rms:
-        return motion
-    later, p = problem.skip_half_cycles(motion.p, 1)
-    later = later.subset(~first)
-    undisturbed = motion.search(later, p)
-    if undisturbed.sum_of_squares / len(later.t) >= thresholds.BETTER_START * motion.sum_of_squares / len(e):
-        return motion
-    undisturbed = truncate_at_stop(replace(undisturbed, available=later))
-    return undisturbed.add_note(
-        f"The motion is free from t = {motion.format_time(later.t[0])} s on; earlier samples are left out."
-    )
-
-
-def skip_disturbed_turns(motion: FreeMotion) -> FreeMotion:
-    """Start at the first or the second turning point if a motion before it that is not free bends the whole fit."""
-    problem, extrema, record = motion.problem, motion.extrema, motion.record
-    mean_square = motion.sum_of_squares / len(problem.t)
-    if mean_square <= (thresholds.DISTURBED * max(problem.noise, problem.residual_floor)) ** 2:
+    """Start at the first or the second turning point if a motion before it is not free, or bends the whole fit."""
+    problem, extrema, e = motion.problem, motion.extrema, motion.residuals()
+    mean_square = motion.sum_of_squares / len(e)
+    is_first = problem.t < problem.half_cycles(motion.p, max_count=1)[1][-1]
+    expected = max(problem.noise, problem.residual_floor)
+    if 3 <= is_first.sum() < len(e):
+        rest = max(expected, float(np.sqrt(np.mean(e[~is_first] ** 2))))
+        is_disturbed = bool(np.sqrt(np.mean(e[is_first] ** 2)) > thresholds.DISTURBED * rest)
+    else:
+        is_disturbed = False
+    if not is_disturbed and mean_square <= (thresholds.DISTURBED * expected) ** 2:
         return motion
     for count in (1, 2):
         if len(extrema.t) < thresholds.MIN_UNDISTURBED + count:
             break
-        begin = float(extrema.t[count - 1])
-        later = replace(extrema, t=extrema.t[count:], x=extrema.x[count:], t_start=begin)
-        available, p = initial_problem(record, later, motion.terms, problem.model.is_pendulum, problem.drift)
-        available = available.subset(available.t >= begin - available.time_origin)
-        undisturbed = replace(motion, extrema=later, available=available, problem=available, p=p)
-        undisturbed = remove_outliers(truncate_at_stop(fit_certain_samples(undisturbed, has_search=False)))
-        share = undisturbed.sum_of_squares / len(undisturbed.problem.t) * (available.scale / problem.scale) ** 2
-        if share < thresholds.BETTER_START * mean_square:
-            notes = [note for note in motion.notes if not note.startswith("The motion is free from")]
-            return replace(undisturbed, notes=tuple(notes)).add_note(
-                f"The motion is free from t = {motion.format_time(begin - problem.time_origin)} s on; earlier samples "
-                "are left out."
+        later, p = problem.skip_half_cycles(motion.p, count)
+        later = later.subset(later.t >= p[T0])
+        undisturbed = remove_outliers(truncate_at_stop(replace(motion.search(later, p), available=later)))
+        if undisturbed.sum_of_squares / len(undisturbed.problem.t) < thresholds.BETTER_START * mean_square:
+            return replace(undisturbed, extrema=extrema.skip(count)).add_note(
+                f"The motion is free from t = {motion.format_time(later.t[0])} s on; earlier samples are left out."
             )
     return motion
 
@@ -236,7 +210,7 @@ def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
         if better * level * problem.scale < rms and departure < problem.t[-1]:
             early = remove_outliers(early)
             at = early.format_time(early.problem.t[-1])
-            return replace(early, whole=(selection, motion.p)).add_note(
+            return early.add_note(
                 f"The record follows the law until t = {at} s and then departs from it; the rest is left out."
             )
     return motion

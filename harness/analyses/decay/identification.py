@@ -24,31 +24,26 @@ import numpy as np
 from ...errors import HarnessError, check_names, option_text
 from ...records.motion import NO_UNIT, RATE_SUFFIXES, Motion
 from ..estimation.estimate import Estimate
-from . import thresholds
 from .decay_problem import DecayProblem, FitError
-from .dependences import LowSpeedRise, find_dependences
 from .estimates import (
     KnownParameters,
     estimate_from_extrema,
     estimate_from_two_peaks,
     force_estimates,
     make_estimates,
-    widen_losses,
 )
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, OMEGA, REST, TERMS, EnergyLoss, Terms, loss_fractions
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
-from .remarks import ambiguity_remark, check_fit, is_unreliable, make_remarks, rise_remark
+from .remarks import ambiguity_remark, check_fit, is_unreliable, make_remarks
 from .samples import (
     Extrema,
     block_size,
     estimate_noise,
     find_extrema,
-    find_reversals_above_noise,
     remove_spikes,
     thin,
-    thinning_error,
 )
 from .window import select_decay
 
@@ -75,8 +70,6 @@ class DecayIdentification:
         Estimates from all turning points.
     two_peak_estimates : tuple of Estimate
         Estimates from the first and the last turning point.
-    rise : LowSpeedRise or None
-        Rise of friction at low speed; None if there are too few half cycles.
     unavailable : dict
         Reasons why the estimates from turning points are empty, by method; an empty text if they are not.
     remarks : tuple of str
@@ -91,7 +84,6 @@ class DecayIdentification:
     estimates: tuple[Estimate, ...]
     extrema_estimates: tuple[Estimate, ...]
     two_peak_estimates: tuple[Estimate, ...]
-    rise: LowSpeedRise | None
     unavailable: dict[str, str]
     remarks: tuple[str, ...]
 
@@ -153,15 +145,6 @@ class DecayIdentification:
         return float(np.sqrt(self.best.sum_of_squares / len(self.problem.t))) * self.problem.scale
 
     @property
-    def undetected_rise(self) -> float:
-        """Rise of friction at low speed that is not excluded, relative to the dry friction; infinite if none is
-        excluded, NaN if one is shown or there is no dry friction."""
-        r = self["r"] if self.rise is not None and not self.rise.is_shown else None
-        if r is None or self.rise is None or not r.low > 0:
-            return np.nan
-        return self.rise.limit / r.value
-
-    @property
     def sentence(self) -> str:
         """The selected law, and by how much it is better than the others."""
         if (
@@ -208,38 +191,18 @@ def fit_decay(
                 return identify_record(without_spikes, parameters, drag, drift, report)
         message = str(error)
         if isinstance(error, FitError):
-            advice = suggest_remedy(record, parameters, drag, drift) or error.advice
+            advice = error.advice
+            if parameters.pendulum and record.order == 2:
+                advice = (
+                    "beyond 90 degrees the angular acceleration of a pendulum has two peaks per half cycle: record the "
+                    f"angle or the angular velocity, or leave out the large amplitudes with {option_text('begin')}"
+                )
+            elif not drift:
+                advice += f", or add {option_text('drift', True)} if the rest position drifts"
             message = f"{record.name} {error}; {advice}"
         if record.notes:  # what was assumed in reading may be wrong
             message += f". {record.notes[0].removesuffix('.')}"
         raise HarnessError(message) from None
-
-
-def suggest_remedy(record: Motion, parameters: KnownParameters, drag: bool, drift: bool) -> str:
-    """Return what would let the record be fitted; empty if that is not known."""
-    if parameters.pendulum and record.order == 2:
-        return (
-            "beyond 90 degrees the angular acceleration of a pendulum has two peaks per half cycle: record the angle "
-            f"or the angular velocity, or leave out the large amplitudes with {option_text('begin')}"
-        )
-    if not drift and has_drifting_middles(record):
-        with suppress(HarnessError):
-            with_drift = identify_record(record, parameters, drag, True, lambda share: None)
-            total = next(estimate.value for estimate in with_drift.estimates if estimate.name == "drift") * np.ptp(
-                record.t
-            )
-            if not with_drift.problem.exceeds_noise(with_drift.best.sum_of_squares):
-                remedy = f"add {option_text('drift', True)}"
-                return f"the rest position drifts by {total:.3g} {record.unit} over the record: {remedy}"
-    return ""
-
-
-def has_drifting_middles(record: Motion) -> bool:
-    """Return whether the middles between the reversals of a record follow time."""
-    at = find_reversals_above_noise(record, estimate_noise(record.t, record.x)[0])
-    x = record.x[at]
-    middles = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4
-    return len(middles) > 2 and abs(np.corrcoef(middles, record.t[at[1:-1]])[0, 1]) > thresholds.DRIFT_CORRELATION
 
 
 def identify_record(
@@ -253,15 +216,14 @@ def identify_record(
             f"deg, rad/s or deg/s, or leave out {option_text('pendulum')}"
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
-    unknowns = 5 + len(terms) + drift
     whole_decay, half_period, choices = select_decay(record, parameters.pendulum)
     _, quantiser_step = estimate_noise(whole_decay.t, whole_decay.x)
-    record, decay = thin_around(record, whole_decay, half_period)
+    decay, block = whole_decay, block_size(whole_decay, half_period)
+    if block > 1:
+        note = f"The {len(decay.t)} samples of the decay are averaged over {block} each."
+        record = thin(record, block)
+        decay = replace(record.select(decay.t[0], decay.t[-1]), notes=(*decay.notes, note))
     extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
-    if len(decay.t) <= unknowns:
-        raise HarnessError(
-            f"{record.name} has {len(decay.t)} samples, too few to fit {unknowns} unknowns: sample finer"
-        )
     report(0.1)
     free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
     problem, extrema = free_motion.problem, free_motion.extrema
@@ -272,22 +234,15 @@ def identify_record(
     full = next(law for law in laws if law.terms == terms)
     uncertainty = estimate_uncertainty(problem, full.p, terms, choices)
     check_fit(record, problem, full, uncertainty, parameters.pendulum)
-    rise = uncertainty.dependences.rise
-    if rise is not None and free_motion.whole is not None:  # the part left out may be where friction rises
-        of_whole = find_dependences(*free_motion.whole, terms).rise
-        rise = of_whole if of_whole is not None and of_whole.is_shown else replace(rise, limit=np.inf)
     reported = select_reported_law(laws, full, problem)
     by_unknown = make_estimates(record, problem, reported, full, uncertainty)
     remarks = [*make_remarks(record, problem, full, uncertainty)]
-    if rise is not None and rise.is_shown:
-        remarks.append(rise_remark(record, rise))
-        by_unknown = widen_losses(by_unknown, rise)
     estimates = tuple(by_unknown.values())
     if is_unreliable(problem, uncertainty):
         estimates = tuple(replace(estimate, error=np.nan, low=np.nan, high=np.nan) for estimate in estimates)
     by_unknown = dict(zip(by_unknown, estimates, strict=True))
     omega = by_unknown[OMEGA]
-    estimates += force_estimates(record, omega, by_unknown, parameters)  # of the widened intervals
+    estimates += force_estimates(record, omega, by_unknown, parameters)
     if record.base not in ("m", "rad", NO_UNIT) and (parameters.k or parameters.m):
         size = option_text("unit", f"0.5mm{RATE_SUFFIXES[record.order]}")
         remarks.append(
@@ -307,24 +262,6 @@ def identify_record(
         estimates,
         by_extrema,
         by_two_peaks,
-        rise,
         unavailable,
         tuple(remarks),
     )
-
-
-def thin_around(record: Motion, decay: Motion, half_period: float) -> tuple[Motion, Motion]:
-    """Return the record and its decay, both thinned, with a note, if the decay is denser than its motion requires."""
-    size = block_size(decay, half_period)
-    if size == 1:
-        return record, decay
-    error = thinning_error(decay, half_period, size)
-    before, after = record.t < decay.t[0], record.t > decay.t[-1]
-    note = (
-        f"The {len(decay.t)} samples of the decay are averaged over {size} each, which shifts none by more than "
-        f"{error:.1g} of the amplitude."
-    )
-    thinned = thin(replace(decay, notes=(*decay.notes, note)), size)
-    parts = [thin(replace(record, t=record.t[part], x=record.x[part]), size) for part in (before, after)]
-    t, x = (np.concatenate([getattr(part, name) for part in (parts[0], thinned, parts[1])]) for name in ("t", "x"))
-    return replace(record, t=t, x=x), thinned

@@ -4,24 +4,18 @@ Correlated residuals carry less information than their number suggests.  With th
 blocks, the covariance (J'J)^-1 (sum of g g' over blocks) (J'J)^-1 allows for that; of several block lengths, the
 largest variance counts.  Slow departures from the law add their variance to that of white residuals.
 
-The intervals of losses near zero, and of losses correlated with them, come from one joint normal measurement of all of
-them.  It starts from the values that the fit would have if losses could be negative: one linear step beyond the bound.
-These measurements z are in units of their standard errors and have the correlation matrix C.  The interval of the first
-mean holds the values m that a likelihood-ratio test accepts.  The test compares the most likely means with that m to
-the most likely means of all, and its critical value is the 95 % quantile of random draws from the former.  An interval
-therefore contains the most likely value, respects the bounds of the other means, and keeps its coverage at zero.
+The intervals of losses come from one joint normal measurement of all of them: the values that the fit would have if
+losses could be negative, one linear step beyond the bound.  The interval of a loss holds the values that a test of the
+likelihood ratio accepts, in which the other losses are the most likely ones that are not negative.  At a bound the
+ratio exceeds the limit that holds without one in at most six percent of all records instead of five.
 
 References
 ----------
 W. K. Newey, K. D. West, Econometrica 55 (1987): the covariance, here with blocks instead of their kernel
-G. J. Feldman, R. D. Cousins, Physical Review D 57 (1998), section IV B: the intervals of a single nonnegative mean
-C.-S. Chuang, T. L. Lai, Statistica Sinica 10 (2000): the treatment of the other means, hybrid resampling
+S. G. Self, K.-Y. Liang, Journal of the American Statistical Association 82 (1987): likelihood ratios at bounds
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache, reduce
-from itertools import combinations
 
 import numpy as np
 from scipy import optimize, special
@@ -31,8 +25,6 @@ from . import thresholds
 from .decay_problem import DecayProblem, column_norms
 from .dependences import Dependences, find_dependences, quarter_width
 from .law import OMEGA, ZETA, Terms
-
-N_DRAWS = 1000
 
 
 @dataclass(frozen=True)
@@ -123,7 +115,7 @@ def distance_from_losses(
     """Return the distance of unconstrained values (n,) from nonnegative losses, in standard errors (n,)."""
     losses = np.flatnonzero((unknowns >= ZETA) & (errors > 0))
     z = unconstrained[losses] / errors[losses]
-    return float(np.sqrt(NonnegativeCone(correlation[np.ix_(losses, losses)]).nearest(z)[1]))
+    return nearest_means(z, correlation[np.ix_(losses, losses)])[1] if len(z) else 0.0
 
 
 def to_correlation(covariance: np.ndarray) -> np.ndarray:
@@ -161,13 +153,10 @@ def confidence_interval(
         Correlation matrix (n, n).
     """
     wide = standard_errors * student_quantile(degrees_of_freedom) / NORMAL_QUANTILE
-    losses = (unknowns >= ZETA) & (wide > 0)
-    z = center / np.where(losses, wide, 1.0)
-    near_bound = losses & (z < thresholds.NEGLIGIBLE_BOUND)
-    if not losses[i] or not near_bound.any():
+    if unknowns[i] < ZETA or not wide[i] > 0:
         return float(center[i] - NORMAL_QUANTILE * wide[i]), float(center[i] + NORMAL_QUANTILE * wide[i])
-    joint = [i, *(j for j in np.flatnonzero(near_bound).tolist() if j != i)]
-    low, high = nonnegative_interval(z[joint], correlation[np.ix_(joint, joint)])
+    joint = [i, *(j for j in np.flatnonzero((unknowns >= ZETA) & (wide > 0)).tolist() if j != i)]
+    low, high = nonnegative_interval(center[joint] / wide[joint], correlation[np.ix_(joint, joint)])
     return float(low * wide[i]), float(high * wide[i])
 
 
@@ -185,7 +174,7 @@ def extend_interval(value: float, low: float, high: float) -> tuple[float, float
 
 
 def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float, float]:
-    """Return the 95 % interval of the first of k nonnegative means.
+    """Return the 95 % interval of the first of k nonnegative means, in standard errors.
 
     Parameters
     ----------
@@ -193,83 +182,30 @@ def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float,
         Measurements (k,) in standard errors.
     correlation : numpy.ndarray
         Correlation matrix (k, k) of the measurements.
-
-    Returns
-    -------
-    low, high : float
-        Bounds in standard errors.
     """
-    cone = NonnegativeCone(correlation)
-    most_likely, min_distance = cone.nearest(z)
-    eigenvalues, axes = np.linalg.eigh(correlation)
-    # the symmetric square root does not depend on the signs of the eigenvectors
-    draws = axes * np.sqrt(np.maximum(eigenvalues, 0.0)) @ axes.T @ quasirandom_normal(len(z))
+    best, least = nearest_means(z, correlation)
 
-    def excess_distance(m: float) -> float:
-        """Return by how much z is farther from the means with first mean m than 95 % of the draws from them are."""
-        means, square = cone.nearest(z, m)
-        points = means[:, None] + draws
-        increase = cone.squared_distances(points, m) - cone.squared_distances(points)
-        limit = np.partition(increase, int(0.95 * N_DRAWS))[int(0.95 * N_DRAWS)]
-        return float(np.sqrt(max(square - min_distance, 0.0)) - np.sqrt(max(limit, 0.0)))
+    def excess(m: float) -> float:
+        """Return the likelihood ratio of means with the first mean m, less the limit of the test."""
+        return nearest_means(z, correlation, m)[1] ** 2 - least**2 - NORMAL_QUANTILE**2
 
-    best, precision = float(most_likely[0]), thresholds.INTERVAL_PRECISION
-    high = optimize.brentq(excess_distance, best, best + thresholds.MAX_BOUND, xtol=precision)
-    if best == 0 or excess_distance(0.0) <= 0:
-        return 0.0, high
-    return optimize.brentq(excess_distance, 0.0, best, xtol=precision), high
+    # the squared distance of a convex set grows at least as it does without bounds
+    low, high, precision = best[0] - 2 * NORMAL_QUANTILE, best[0] + 2 * NORMAL_QUANTILE, thresholds.INTERVAL_PRECISION
+    end = optimize.brentq(excess, best[0], high, xtol=precision)
+    if low <= 0 and excess(0.0) <= 0:
+        return 0.0, end
+    return optimize.brentq(excess, max(low, 0.0), best[0], xtol=precision), end
 
 
-class NonnegativeCone:
-    """The cone of nonnegative means, with the distance that belongs to a correlation matrix (k, k)."""
+def nearest_means(z: np.ndarray, correlation: np.ndarray, first: float | None = None) -> tuple[np.ndarray, float]:
+    """Return the nonnegative means nearest to measurements z (k,), perhaps with a given first, and their distance.
 
-    def __init__(self, correlation: np.ndarray) -> None:
-        k = len(correlation)
-        self.faces = []
-        for fixed in (list(indices) for size in range(k + 1) for indices in combinations(range(k), size)):
-            free = [i for i in range(k) if i not in fixed]
-            weight = np.linalg.pinv(correlation[np.ix_(fixed, fixed)])
-            self.faces.append((fixed, free, weight, correlation[np.ix_(free, fixed)] @ weight))
-
-    def nearest(self, z: np.ndarray, first: float | None = None) -> tuple[np.ndarray, float]:
-        """Return the point of the cone nearest to z (k,) and the squared distance.
-
-        With `first`, the first mean has that value.  Of all faces on which the projection of z is nonnegative, the
-        nearest one counts.
-        """
-        free, moved, squares = min(self.projections(z[:, None], first), key=lambda face: float(face[2][0]))
-        means = np.zeros_like(z)
-        means[free] = moved[:, 0]
-        if first is not None:
-            means[0] = first
-        return means, float(squares[0])
-
-    def squared_distances(self, z: np.ndarray, first: float | None = None) -> np.ndarray:
-        """Return the squared distances (n,) of the points z (k, n) from the cone."""
-        return reduce(np.minimum, (squares for _, _, squares in self.projections(z, first)))
-
-    def projections(self, z: np.ndarray, first: float | None) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
-        """Yield for each face its free means, their values nearest to z (k, n), and the squared distances (n,).
-
-        The distance is infinite where a free mean would be negative.
-        """
-        if first is not None:
-            z = np.concatenate([z[:1] - first, z[1:]])
-        for fixed, free, weight, slope in self.faces:
-            if first is None or 0 in fixed:
-                offset = z[fixed]
-                moved = z[free] - slope @ offset
-                yield free, moved, np.where((moved >= 0).all(axis=0), (weight @ offset * offset).sum(axis=0), np.inf)
-
-
-@cache
-def quasirandom_normal(k: int) -> np.ndarray:
-    """Return quasi-random draws (k, N_DRAWS) of independent standard normal numbers, the same in every run.
-
-    References
-    ----------
-    M. Roberts, The unreasonable effectiveness of quasirandom sequences (2018)
+    The distance is in standard errors of measurements with this correlation matrix (k, k).
     """
-    ratio = optimize.brentq(lambda g: g ** (k + 1) - g - 1, 1.0, 2.0, xtol=1e-15)
-    uniform = (0.5 + np.outer(ratio ** -np.arange(1.0, k + 1), np.arange(1, N_DRAWS + 1))) % 1
-    return np.asarray(special.ndtri(uniform))
+    sizes, axes = np.linalg.eigh(correlation)
+    weights = axes / np.sqrt(np.maximum(sizes, thresholds.SEEN)) @ axes.T
+    if first is None:
+        return optimize.nnls(weights, weights @ z)
+    aim = weights @ z - weights[:, 0] * first
+    others, distance = optimize.nnls(weights[:, 1:], aim) if len(z) > 1 else (z[1:], float(np.linalg.norm(aim)))
+    return np.append(first, others), distance

@@ -42,7 +42,7 @@ A. Jorba, M. Zou, Experimental Mathematics 14 (2005), section 3: integration by 
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from itertools import combinations
 from math import log, pi, sqrt
 
@@ -221,8 +221,9 @@ class HalfCycleSequence:
         for _ in range(order):
             at_nodes = differentiate_series(at_nodes)
         terms = len(at_nodes)
-        by_law = at_nodes.reshape(-1, laws, nodes).transpose(1, 0, 2)
-        return np.matmul(by_law, self.weights.transpose(0, 2, 1)).reshape(laws, terms, -1)
+        by_law = at_nodes.reshape(terms, -1, laws, nodes).transpose(2, 1, 0, 3)  # small products, which BLAS
+        at_cycles = np.matmul(by_law, self.weights.transpose(0, 2, 1)[:, None])  # leaves in one thread
+        return at_cycles.transpose(0, 2, 1, 3).reshape(laws, terms, -1)
 
 
 def iterate_return_map(
@@ -322,20 +323,9 @@ def differentiate_series(series: np.ndarray) -> np.ndarray:
     return series[1:] * powers
 
 
-def compute_powers(h: np.ndarray, count: int) -> np.ndarray:
-    """Return h (L,) to the powers 0 to count - 1, as (count, L)."""
-    result = np.empty((count, len(h)))
-    result[0], result[1], n_powers = 1.0, h, 2
-    while n_powers < count:
-        batch = min(n_powers - 1, count - n_powers)
-        np.multiply(result[n_powers - 1], result[1 : batch + 1], out=result[n_powers : n_powers + batch])
-        n_powers += batch
-    return result
-
-
-def evaluate_series(series: np.ndarray, powers: np.ndarray) -> np.ndarray:
-    """Return the values (L,) of the series (K, L), from the powers (K or more, L) of their arguments."""
-    return np.asarray(np.einsum("ij,ij->j", series, powers[: len(series)]))
+def evaluate_series(series: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Return the values (L,) of the series (K, L) at h (L,), by Horner's rule."""
+    return reduce(lambda total, term: total * h + term, series[::-1])
 
 
 def integrate_half_cycles(
@@ -359,7 +349,7 @@ def integrate_half_cycles(
         ends = np.flatnonzero(np.isnan(end) & (w >= 0))
         if len(ends):
             root = time_to_standstill(velocity[:, ends], h)
-            duration[ends], end[ends] = at + root, evaluate_series(c[:, ends], compute_powers(root, len(c)))
+            duration[ends], end[ends] = at + root, evaluate_series(c[:, ends], root)
         if not np.isnan(end).any() or not np.isfinite(y).all():
             break
         at += h
@@ -378,8 +368,7 @@ def time_to_standstill(velocity: np.ndarray, h: float) -> np.ndarray:
     """Return the zeros in (0, h] of velocity series that are negative at 0 and not at h, by Newton's method from h."""
     slope, root = differentiate_series(velocity), np.full(velocity.shape[1], h)
     for _ in range(12):
-        at = compute_powers(root, len(velocity))
-        step = evaluate_series(velocity, at) / np.maximum(evaluate_series(slope, at), 1e-300)
+        step = evaluate_series(velocity, root) / np.maximum(evaluate_series(slope, root), 1e-300)
         root = np.minimum(np.maximum(root - step, 0.0), h)
         if np.abs(step).max() < 1e-8:
             break  # convergence is quadratic: the next step is negligible

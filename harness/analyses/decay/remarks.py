@@ -6,7 +6,7 @@ from ...errors import command_text, option_text
 from ...records.motion import Motion
 from . import thresholds
 from .decay_problem import DecayProblem, FitError
-from .dependences import CAUSES, LowSpeedRise
+from .dependences import CAUSES
 from .intervals import FitUncertainty
 from .law import AMPLITUDE, OMEGA, REST
 from .model_selection import FittedLaw, deviance_difference
@@ -18,10 +18,16 @@ def check_fit(
     record: Motion, problem: DecayProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
 ) -> None:
     """Raise FitError if the best fit leaves large residuals, or gains energy."""
+    if uncertainty.distance_from_losses > thresholds.SIGNIFICANT_GAIN:
+        advice = f"fit a model with its drive by {command_text('fit')}"
+        raise FitError("has swings that no loss describes, so it is driven or gains energy", advice)
     e, _ = problem.residuals(full.p, full.terms)
     share = uncertainty.rms / problem.signal_rms
     if share > thresholds.NOT_A_DECAY and uncertainty.rms > thresholds.NOT_NOISE * problem.noise:
-        advice = f"cut the record there with {option_text('begin')} or {option_text('end')}"
+        advice = (
+            f"cut the record there with {option_text('begin')} or {option_text('end')}, or use "
+            f"{command_text('fit', 'stickslip')} for a driven motion"
+        )
         if record.base == "rad" and not pendulum:
             advice = f"add {option_text('pendulum', True)} if it is a pendulum, or " + advice
         raise FitError(
@@ -29,9 +35,6 @@ def check_fit(
             f"of the motion and largest near t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s",
             advice,
         )
-    if uncertainty.distance_from_losses > thresholds.SIGNIFICANT_GAIN:
-        advice = f"fit a model with its drive by {command_text('fit')}"
-        raise FitError("has swings that no loss describes, so it is driven or gains energy", advice)
 
 
 def is_unreliable(problem: DecayProblem, uncertainty: FitUncertainty) -> bool:
@@ -56,28 +59,26 @@ def make_remarks(
     if uncertainty.rms < thresholds.EXACT * full.p[AMPLITUDE]:
         return ()
     is_rough = uncertainty.rms > thresholds.ROUGH * problem.noise
-    remarks, residuals = [], f"The residuals of the fit are {rms:.3g} {unit} (rms)"
-    noise_level = f"the noise of the samples is {noise:.3g} {unit}"
+    remarks = []
     correlated = "the noise is not independent from sample to sample"
-    disturbed = f"something else acts on the oscillator too, or {correlated}"
-    share = uncertainty.rms / problem.signal_rms
-    solver = ""
-    if problem.noise < thresholds.NOISELESS * full.p[AMPLITUDE]:
-        solver = (
-            " If a solver wrote the record, its errors change the losses like this: simulate with a smaller tolerance."
-        )
-    if is_rough and share > thresholds.WARNED:
+    if is_rough:
+        share = uncertainty.rms / problem.signal_rms
         e, _ = problem.residuals(full.p, full.terms)
+        if is_unreliable(problem, uncertainty):
+            advice = "Do not rely on these values."
+        else:
+            advice = WIDENED if uncertainty.is_correlated else "Check the time stamps."
         remarks.append(
-            f"{residuals}, {100 * share:.1f} % of the motion, and largest near "
-            f"t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s, while {noise_level}: "
-            f"{disturbed}. "
-            + ("Do not rely on these values." if is_unreliable(problem, uncertainty) else WIDENED)
-            + solver
+            f"The residuals of the fit are {rms:.3g} {unit} (rms), {100 * share:.2g} % of the "
+            f"motion, and largest near t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s, "
+            f"while the noise of the samples is {noise:.3g} {unit}: something else acts on the oscillator too, or "
+            f"{correlated}. {advice}"
         )
-    elif is_rough:
-        advice = f"{disturbed}. {WIDENED}" if uncertainty.is_correlated else "check the time stamps."
-        remarks.append(f"{residuals}, while {noise_level}: {advice}{solver}")
+        if problem.noise < thresholds.NOISELESS * full.p[AMPLITUDE]:
+            remarks[0] += (
+                " If a solver wrote the record, its errors change the losses like this: simulate with a smaller "
+                "tolerance."
+            )
     elif uncertainty.is_correlated:
         remarks.append(
             f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. {WIDENED}"
@@ -92,6 +93,10 @@ def dependences_remark(problem: DecayProblem, sizes: dict[str, float], unit: str
         return []
     parts = " or ".join(f"in {name} by {size * problem.scale:.1g} {unit}" for name, size in sizes.items())
     remedy = f" {option_text('drift', True)} fits a constant drift." if "rest" in sizes and not problem.drift else ""
+    if "speed" in sizes:
+        remedy += (
+            f" No law of decay has friction that rises: fit a model with Stribeck friction by {command_text('fit')}."
+        )
     return [
         f"The record departs from the law, {parts} (rms), as with {' or '.join(CAUSES[name] for name in sizes)}. "
         f"{WIDENED}{remedy}"
@@ -142,15 +147,4 @@ def ambiguity_remark(problem: DecayProblem, laws: tuple[FittedLaw, ...]) -> tupl
     return (
         f"{names[0].upper()}{names[1:]} cannot be distinguished from {best.description} at this noise: that takes "
         f"{factor:.1f} times less noise, {np.ceil(factor**2):.0f} times as many samples, or more and larger cycles.",
-    )
-
-
-def rise_remark(record: Motion, rise: LowSpeedRise) -> str:
-    """Return the remark on friction that rises at low speed."""
-    return (
-        f"Friction that rises at low speed fits better: it is {rise.size:.2g} {record.base} (over stiffness) larger at "
-        f"standstill than about {np.mean(rise.losses['r']):.2g} {record.base} above {rise.speed:g} of the first peak "
-        "speed. No law of decay has such a rise. The intervals of the losses are widened, and may still miss the true "
-        "values: "
-        f"fit a model with Stribeck friction by {command_text('fit')}."
     )

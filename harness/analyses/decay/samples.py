@@ -17,6 +17,7 @@ remains for blocks of length h, where the acceleration does not jump.
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
@@ -235,6 +236,10 @@ class Extrema:
     segment_start: float
     error: float
 
+    def skip(self, count: int) -> Self:
+        """Return the turning points without the first ones."""
+        return replace(self, t=self.t[count:], x=self.x[count:], t_start=float(self.t[count - 1]))
+
     def rest_positions(self, may_drift: bool) -> np.ndarray:
         """Return the rest position at each turning point (n,): one for all, or on a straight line if it may drift."""
         t, x = self.t, self.x
@@ -260,13 +265,11 @@ def find_extrema(record: Motion, half_period: float, quantiser_step: float, pend
                 f"{record.name} is all noise: its range is {span:.3g} {record.unit}, its noise {noise:.3g}; "
                 "filter it, or take at least 10 samples per cycle"
             )
-        turns = (
-            f"{record.name} has {count} turning point{'s' * (count != 1)} above the noise ({noise:.3g} {record.unit})"
+        raise HarnessError(
+            f"{record.name} has {count} turning point{'s' * (count != 1)} above the noise ({noise:.3g} {record.unit}), "
+            f"its start among them, and {thresholds.MIN_TURNING_POINTS} or more are needed without gaps and with "
+            "samples between them: make a longer record, sample faster, or select a part"
         )
-        if count < thresholds.MIN_TURNING_POINTS:
-            least = thresholds.MIN_TURNING_POINTS
-            raise HarnessError(f"{turns}, its start among them, and {least} or more are needed: make a longer record")
-        raise HarnessError(f"{turns}, and too few samples or gaps between them: sample faster, or select a part")
     t_start, i = locate_start(best)
     t, x = best.refine(i)
     error = best.position_error(x)
@@ -320,19 +323,6 @@ def block_size(record: Motion, half_period: float) -> int:
     interval = float(np.median(np.diff(record.t)))
     per_period = 2 * half_period / interval / thresholds.MIN_THINNED_PER_PERIOD
     return max(int(min(n / thresholds.MIN_THINNED_SAMPLES, per_period)), 1)
-
-
-def thinning_error(record: Motion, half_period: float, size: int) -> float:
-    """Return the largest shift of a sample by thinning, relative to the amplitude of a sine with this half period.
-
-    At uneven times it is that of the mean itself, without the correction by the second derivative.
-    """
-    intervals = np.diff(record.t)
-    phase = np.pi * size * float(np.median(intervals)) / half_period
-    if np.percentile(intervals, 90) < thresholds.EVEN_INTERVALS * np.percentile(intervals, 10):
-        return float(phase**4 / 72)
-    times = record.t[: len(record.t) // size * size].reshape(-1, size)
-    return float((np.pi / half_period) ** 2 * np.percentile(times.var(axis=1), 99) / 2)
 
 
 def thin(record: Motion, size: int) -> Motion:

@@ -33,21 +33,18 @@ MIN_SPACING, MAX_SPACING = 0.65, 1.5  # times the interval before: outside, the 
 # --- Free decay within a record (window.py) ---
 MIN_SELECTED_TURNS = 7  # turning points: with fewer, a decay cannot be distinguished from other motions
 MIN_SWINGS = 4  # of a decay
-GROWTH_ERRORS, GROWTH = 8.0, 1.001  # standard errors and ratio of the last amplitude to the first: it is driven
+GROWTH_ERRORS = 8.0  # standard errors by which a swing may exceed the one before: none does by chance
 SMALL_GROWTH = 1.02  # ratio of neighbouring swings: the scatter of a disturbed decay
 SIGNIFICANT_LOSS = 4.0  # standard errors of the loss of all swings
 MIN_STEADY_SWINGS = 6  # of a drive before the decay
 STEADY = 0.02  # of the largest swing: scatter of swings that a drive keeps up
 STEADY_LOSS = 0.2  # of the loss per swing afterwards: the loss per swing of a decay never rises
-SUDDEN_LOSS = 3.0  # times the loss that drag explains: a swing before it is that of a hand
 LARGE_SWING = 2.0  # rad, amplitude from which on a pendulum swings in no wave
 NO_WAVE = 0.05  # of the power of a cycle
 MANY_SWINGS = 12  # swings that show whether a motion is regular, grows or is constant
 LARGE_PART = 0.5  # of the record: a longer decay needs no other half period
 LARGE_FIRST = 3.0  # times the median swing: a decay from such a swing is not one of many
 SMALL_PART = 0.25  # of the swings: both halves of a shorter decay must be decays
-IRREGULAR = 0.3  # standard deviation of the logarithm of the times between turning points
-SAWTOOTH = 2.0  # ratio of the times of rise and fall
 MAX_NODE_SWINGS = 6  # swings from the end of a decay to the node of a beat
 CONSTANT = 0.01  # standard error of the loss below which its absence is a constant amplitude
 LONG_REST = 2.4  # half periods before the first swing that are left out
@@ -60,7 +57,6 @@ RIVAL = 0.5  # weight of another decay, relative to the selected one
 MAX_DENSE_SAMPLES = 10_000  # a record with fewer samples is fitted as it is
 MIN_THINNED_SAMPLES = 5_000  # of a thinned record
 MIN_THINNED_PER_PERIOD = 64.0  # samples: their means differ by 1.3e-6 of the amplitude
-EVEN_INTERVALS = 1.05  # ratio of long to short intervals: with a larger one the times are uneven
 MAX_BLOCK_SPAN = 1.5  # times the median span of neighbouring blocks: a longer one has a gap
 
 # --- Turning points of the decay (samples.py) ---
@@ -90,10 +86,9 @@ MAX_DAMPING_RATIO = 0.9  # beyond, nothing oscillates
 # --- Free motion (free_motion.py) ---
 CERTAIN_TIME = 0.6  # half periods after the last turning point: the motion certainly goes on as long
 MIN_QUANTISER_STEPS = 2.0  # between the turning points of a half cycle: with fewer, a record repeats one value
-DISTURBED_START = 2.0  # times the noise and the other residuals: a first half cycle with larger ones is no free motion
 BETTER_START = 0.5  # of the mean square of the residuals: a start is left out only if that halves it at least
 MAX_OUTLIERS = 0.001  # fraction of the samples, in addition to two: a record with more does not follow the law
-DISTURBED = 2.0  # times the noise: residuals of a record that departs from the law somewhere
+DISTURBED = 2.0  # times the noise: residuals of a record, or of its first half cycle, that depart from the law
 UNDISTURBED_PARTS = (0.8, 0.6, 0.35)  # fractions of the turning points that are tried as undisturbed
 MIN_UNDISTURBED = 6  # turning points before a disturbance, to know the law that it departs from
 MAX_EXTENSIONS = 6  # of the samples before a disturbance: each fit is valid a little farther than its samples
@@ -109,20 +104,14 @@ EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by m
 # --- Intervals (intervals.py) ---
 BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)  # lengths on which residuals may be correlated
 MIN_BLOCKS, MAX_BLOCKS = 24, 400  # fewer leave the variance uncertain; more are shorter than any correlation
-NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
-MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
-INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain
+INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what is printed
 
 # --- Test of the residuals (dependences.py) ---
 WALK_PIECES = 8  # of the random walk of phase, amplitude and rest position over a record
 SEEN = 1e-9  # of the largest eigenvalue, or singular value: smaller parts are those that the fitted values follow
 PROVEN = 4.0  # of the logarithm of the likelihood: white noise exceeds it in one record of 400
-RISE_SPEEDS = (0.05, 0.1, 0.2, 0.4)  # of the first peak speed: the rise falls to 1/e there
-MIN_RISE_HALF_CYCLES = 8  # with fewer, the laws with three losses follow every rise
-SHOWN_RISE = 3.3  # standard errors: chance exceeds it in one record of 1000 for each speed
-RISE_BLOCKS = (24, 100)  # of residuals that may be correlated
-MAX_RISE = 3.0  # times the friction at high speed: a larger one is another departure from the law
-LIMIT_SPEED = 0.1  # of RISE_SPEEDS: the one for which the limit is stated
+RISE_SPEEDS = (0.05, 0.1, 0.2, 0.4)  # of the first peak speed: the rise of friction falls to 1/e there
+MIN_SPEED_HALF_CYCLES = 8  # with fewer, the laws with three losses follow every rise
 MIN_SENSITIVITY = 1e-3  # of an amplitude to the first one
 
 # --- Remarks and refusals (remarks.py) ---
@@ -130,9 +119,7 @@ ROUGH = 1.5  # times the noise: larger residuals are not the noise of single sam
 NOT_A_DECAY = 0.1  # fraction of the motion: with larger residuals the record is refused
 NOT_NOISE = 2.0  # times the noise: smaller residuals are no reason to refuse a record
 UNRELIABLE = 0.05  # fraction of the motion: with larger residuals that are no noise, no interval is stated
-WARNED = 0.008  # fraction of the motion: with larger residuals the remark is a warning
 NOISELESS = 3e-4  # of the amplitude: records with less noise are often simulated
-DRIFT_CORRELATION = 0.8  # of the middles between reversals with time, from which on a drift is tried
 EXACT = 1e-9  # of the amplitude: smaller residuals are those of the model, and need no remark
 CLEAR_BIC = 6.0  # difference of BIC: odds of 20 to 1
 SIGNIFICANT_DEVIANCE = 4.0  # of n ln(squares): an unnecessary term exceeds it in one record of twenty

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...analyses.decay.identification import DecayIdentification
 from ...analyses.decay.law import AMPLITUDE, T0
-from ...analyses.decay.thresholds import LIMIT_SPEED
 from ...analyses.estimation.estimate import ColumnResiduals, Estimate, UsedSamples, shared_json
 from ...results.files import column_heading, write_csv
 from ...results.quantity import format_interval
@@ -97,17 +96,6 @@ class DecayResult(Result, DecayIdentification):
                 "The values from two peaks are rough checks: each attributes the whole loss to one mechanism, and is "
                 "too large if several act."
             )
-        rise = self.undetected_rise
-        if np.isinf(rise):
-            lines.append(
-                "No friction that rises at low speed is excluded (Stribeck): the record departs from the law, and the "
-                "part after that shows none. The losses of the part before may be those of such friction."
-            )
-        elif rise < 1.0:  # a larger limit says nothing
-            lines.append(
-                f"Friction that rises at low speed by less than {100 * rise:.2g} % of r is not excluded (Stribeck, "
-                f"falling to 1/e of the rise at {LIMIT_SPEED:g} of the first peak speed)."
-            )
         t, record = self.t, self.record
         n_excluded = len(record.t) - len(t)
         if n_excluded:
@@ -139,15 +127,6 @@ class DecayResult(Result, DecayIdentification):
                 "unit": record.base,
             },
             "turning_points": [asdict(estimate) for estimate in self.extrema_estimates],
-            "low_speed_rise": {
-                "shown": self.rise.is_shown,
-                "size": self.rise.size,
-                "relative_speed": self.rise.speed,
-                "limit": self.rise.limit if np.isfinite(self.rise.limit) else None,
-                "unit": record.base,
-            }
-            if self.rise
-            else None,
             "published": [asdict(estimate) for estimate in self.two_peak_estimates],
             "why_empty": {name: reason for name, reason in self.unavailable.items() if reason},
             "laws": [
