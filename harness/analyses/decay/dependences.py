@@ -48,10 +48,7 @@ class Dependences:
 
 
 def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Dependences:
-    """Return on what the residuals of the fitted values p of a law with these terms depend.
-
-    A loss of zero is at its bound, so that it hides no effect that a negative loss would follow.
-    """
+    """Return on what the residuals of the fitted values p of a law with these terms depend."""
     e, jacobian = problem.residuals(p, terms)
     e, width = -e, quarter_width(problem, p)
     scale = column_norms(jacobian)
@@ -59,16 +56,19 @@ def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Depe
     effects = signal_effects(problem, p, e, jacobian)
     if "r" in terms and len(problem.half_cycles(p)[0]) >= thresholds.MIN_SPEED_HALF_CYCLES:
         effects["speed"] = speed_effects(problem, p, terms, jacobian)
-    sizes: dict[str, float] = {}
     unknowns = problem.unknowns(terms)
-    variances, columns = np.zeros(len(inverse)), jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)]
+    free = orthonormal(jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)])
+    sizes: dict[str, float] = {}
+    variances, columns = np.zeros(len(inverse)), jacobian
     while effects:
-        basis = orthonormal(columns)
-        found = {name: effect_variance(effect, e, basis, width) for name, effect in effects.items()}
+        basis, found = orthonormal(columns), {}
+        for name, effect in effects.items():  # a loss at its bound hides no rise, which a negative loss would follow
+            found[name] = effect_variance(effect, e, free if name == "speed" else basis, width)
         name, (variance, gain) = max(found.items(), key=lambda item: item[1][1])
         if gain < thresholds.PROVEN:
             break
         effect = effects.pop(name)
+        effects.pop("speed", None)  # it follows what any other cause leaves, so that it counts as the first one only
         variances += variance * ((inverse @ (jacobian.T @ effect)) ** 2).sum(axis=1)
         columns = np.column_stack([columns, effect])
         sizes[name] = float(np.sqrt(variance * np.mean((effect**2).sum(axis=1))))
