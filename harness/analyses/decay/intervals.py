@@ -95,27 +95,20 @@ def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms, cho
         )
     errors = np.sqrt(np.maximum(variance, noise * np.diag(inverse) + dependences.variances * scale**2)) / scale
     unconstrained = p[unknowns] - inverse @ (jacobian.T @ e) / scale
+    correlation, losses = to_correlation(inverse), (unknowns >= ZETA) & (variance > 0)
+    z = unconstrained[losses] * scale[losses] / np.sqrt(variance[losses])
     return FitUncertainty(
         unknowns,
         special.ndtri(1 - (1 - UPPER) / choices) / NORMAL_QUANTILE * errors,
-        to_correlation(inverse),
+        correlation,
         unconstrained,
-        distance_from_losses(unknowns, unconstrained, np.sqrt(variance) / scale, to_correlation(inverse)),
+        nearest_means(z, correlation[np.ix_(losses, losses)])[1] if len(z) else 0.0,
         rms,
         neighbour_correlation,
         is_correlated,
         degrees_of_freedom,
         dependences,
     )
-
-
-def distance_from_losses(
-    unknowns: np.ndarray, unconstrained: np.ndarray, errors: np.ndarray, correlation: np.ndarray
-) -> float:
-    """Return the distance of unconstrained values (n,) from nonnegative losses, in standard errors (n,)."""
-    losses = np.flatnonzero((unknowns >= ZETA) & (errors > 0))
-    z = unconstrained[losses] / errors[losses]
-    return nearest_means(z, correlation[np.ix_(losses, losses)])[1] if len(z) else 0.0
 
 
 def to_correlation(covariance: np.ndarray) -> np.ndarray:
