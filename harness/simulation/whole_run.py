@@ -51,8 +51,9 @@ FUNCTIONS = {  # in the order of the structs in whole_run.c
     ),
     "3.0": ("SetFloat64", "EnterInitializationMode", "ExitInitializationMode", "GetFloat64", "DoStep"),
 }
-# without the runtime of the compiler, which would have to be built first
-OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-nostdlib", "-lc", "-lm")
+# without the runtime of the compiler, which would have to be built first, and without fused operations, which not all
+# processors have
+OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-nostdlib", "-lc", "-lm")
 STEPS_PER_CHECK = 16
 MAX_PREPARED = 64  # runs in the cache of a worker process
 BUSY_TIME = 20.0  # s that a run in a worker process may take beyond its processor time, on a busy machine
