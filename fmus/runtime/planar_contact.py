@@ -39,13 +39,13 @@ SMALLEST_TOLERANCE = 1e-13  # lower ones are rounding errors
 RESOLVED = 100.0  # shortest steps in which a slip vanishes that a method can resolve
 CONSTANT_SHARE = 0.01  # of the excess of friction over load, by which the load may change up to the rest
 # Model exchange
-BEGINNING, RESTING = 2, 3  # phases of a slip; its mode at trial points, with a sign
+BEGINNING, RESTING, PASSING = 2, 3, 4  # phases of a slip; its mode at trial points, with a sign
 GROWTH = 10.0  # of the slip since the last event: the solver restarts
 GROWTH_ERROR = 1e-6  # by which the solver may find that event early
 BEGINNING_SHARE = 1e-3  # of the nominal slip: up to this size the slip has the direction of its load
 FOLLOWED_SHARE = 0.1  # of the slip at the last evaluation of rates; a smaller one at an event has passed zero in a step
 APPROACH_SIZE, TURNED_FACTOR = 1e-6, 3.0  # of the slip: it may rest; of this, a larger one has turned by a right angle
-END_SHARE = 1e-7  # of the slip where it begins to fall along a straight line: there it rests
+END_SHARE = 1e-5  # of the slip where it begins to fall along a straight line: there it rests
 CLEAR_SHARE = 1.0 - 1e-6  # of the friction, below which a load brings the body to rest
 REST_SHARE = 1e-10  # of the largest slip since the last event; a smaller one that has passed zero rests
 TINY = 1e-300  # avoids a division by zero
@@ -64,7 +64,7 @@ class PlanarFriction(CoupledFriction):
     trial: ContactVector  # its size at the last evaluation of rates
     approach: ContactVector  # its size from which on it may come to rest
     unit_slip: ContactVector  # its size after the last event, of which the event indicator is a multiple
-    slip_phase: ContactVector  # STUCK, FORWARD, BEGINNING, RESTING
+    slip_phase: ContactVector  # STUCK, FORWARD, BEGINNING, RESTING, PASSING
 
     def __init__(self):
         super().__init__()
@@ -251,7 +251,8 @@ def time_to_rest(model, step, i: ContactIndex):
 #
 # The motion must be smooth between events.  The indicator is `progress`, the slip in its direction at the last
 # completed step.  Where it is small and the load below the friction, the phase RESTING begins: the slip falls along a
-# straight line in the time that the closed form gives.  At trial points beyond zero, friction keeps its direction:
+# straight line in the time that the closed form gives.  Under a larger load the phase PASSING begins: a slip that is
+# almost head-on becomes zero where it is a rounding error.  At trial points beyond zero, friction keeps its direction:
 # the mode is negative.  A slip that begins has the direction of its load while it is small: phase BEGINNING.
 # Friction turns a small slip fast, and implicit solvers keep a Jacobian for many steps: that of a much smaller slip
 # hides errors from them.  So they restart where the slip has grown by GROWTH.
@@ -329,9 +330,9 @@ def stop_passing(model, step, t, y: StateVector, modes: ContactVector, i: Contac
     """Return the states at an event, without a slip that has passed zero but for errors of the importer's solver."""
     if modes[i] == STUCK or not is_due(model, t, y, i):
         return y
-    if model.slip_phase[i] == FORWARD:
-        has_passed = progress(model, t, y, i) <= 0.0 and is_near_zero(model, step, t, y, i)
-        if not has_passed or can_rest(model, t, y, modes, i):
+    if model.slip_phase[i] == FORWARD or model.slip_phase[i] == PASSING:
+        has_passed = model.slip_phase[i] == PASSING or progress(model, t, y, i) <= 0.0
+        if not (has_passed and is_near_zero(model, step, t, y, i)) or can_rest(model, t, y, modes, i):
             return y
     held_modes = contact_vector()
     for j in contact_indices:
@@ -363,4 +364,6 @@ def begin_phase(model, step, t, y: StateVector, modes: ContactVector, i: Contact
         model.approach[i] = APPROACH_SIZE * size
     elif can_rest(model, t, y, modes, i):
         model.slip_phase[i], model.approach[i] = RESTING, END_SHARE * size
+    else:
+        model.slip_phase[i], model.approach[i] = PASSING, APPROACH_SIZE * size
     return True

@@ -370,7 +370,8 @@ static int64_t row_at_present(const Run *run)
 }
 
 /* Update the derivatives of the states after an event: their change, and that by the derivatives of the event time. */
-static void update_slopes(Run *run, const double *moved, const double *slopes, const double *rates, const double *new_rates)
+static void update_slopes(Run *run, const double *y, const double *moved, const double *slopes, const double *rates,
+                          const double *new_rates)
 {
     double largest = 0.0;
     for (size_t j = 0; j < run->n; j++) largest = fmax(largest, fabs(rates[j] - new_rates[j]));
@@ -378,6 +379,7 @@ static void update_slopes(Run *run, const double *moved, const double *slopes, c
         for (size_t j = 0; j < run->n; j++) {
             double *slope = run->z + run->n * (1 + i) + j, change = rates[j] - new_rates[j];
             *slope = moved ? moved[i * run->n + j] - slopes[i] * new_rates[j] : *slope + slopes[i] * change;
+            if (!moved && run->z[j] == 0.0 && y[j] != 0.0) *slope = -slopes[i] * new_rates[j]; /* the event stops it */
             /* what is left of a speed at rest is an error, and would decide on modes at the next break-away */
             bool is_speed = fabs(change) >= CHANGED * largest && fabs(new_rates[j]) <= CANCELLED * fabs(rates[j]);
             if (is_speed && fabs(*slope) <= CANCELLED * fabs(slopes[i]) * largest) *slope = 0.0;
@@ -430,7 +432,7 @@ static int handle_event(Run *run, int64_t indicator, bool is_row)
         differs |= fabs(new_rates[j] - rates[j]) > RESET * run->rtol * size;
     }
     if (!jumps && !differs) return is_row ? check_ties(run, -1, no_slopes, 0.0) : REACHED;
-    update_slopes(run, jumps ? moved : NULL, slopes, rates, new_rates);
+    update_slopes(run, y, jumps ? moved : NULL, slopes, rates, new_rates);
     for (size_t i = 0; i < m; i++) sides[i] = NAN;
     if (!count) {
         if (!is_row) note(run, run->t, -1, NO_INDICATOR, sides);

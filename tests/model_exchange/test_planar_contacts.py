@@ -16,6 +16,36 @@ from benchmarks.references.plane import rest
 
 KINDS = {"FMI 3.0": ("--fmi", "3"), "FMI 2.0": ("--native",)}
 PLATFORM = ("--platform", "linux64")
+PAIR = '''from fmus import Fixed, Mode, Model, Output, Parameter, PlanarContact, State
+
+class Pair(Model):
+    """Two bodies on a plane, with a spring and a damper between them."""
+
+    f = Parameter(2.0, "N", "friction", low=0.0)
+    k = Parameter(30.0, "N/m", "stiffness", low=0.0)
+    c = Parameter(0.3, "N.s/m", "damping", low=0.0)
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    v_x0 = Fixed(1.0, "m/s", "initial speed along x")
+    v_y0 = Fixed(0.3, "m/s", "initial speed along y")
+    x = State("m", "position along x")
+    y = State("m", "position along y")
+    v_x = State("m/s", "speed along x", start=v_x0, rate_of=x)
+    v_y = State("m/s", "speed along y", start=v_y0, rate_of=y)
+    z_x = State("m", "position of the second body along x")
+    z_y = State("m", "position of the second body along y")
+    w_x = State("m/s", "its speed along x", rate_of=z_x)
+    w_y = State("m/s", "its speed along y", rate_of=z_y)
+    mode, second_mode = Mode(), Mode()
+    R = PlanarContact("N", "friction", mode=mode, slip=(v_x, v_y), slide=f, hold=f)
+    S = PlanarContact("N", "friction of the second body", mode=second_mode, slip=(w_x, w_y), slide=f, hold=f)
+    F_x = Output("N", "force along x", k * (z_x - x) + c * (w_x - v_x))
+    F_y = Output("N", "force along y", k * (z_y - y) + c * (w_y - v_y))
+    a_x = Output("m/s2", "acceleration along x", (F_x - R.x) / m, rate_of=v_x)
+    a_y = Output("m/s2", "acceleration along y", (F_y - R.y) / m, rate_of=v_y)
+    b_x = Output("m/s2", "acceleration of the second body along x", (-F_x - S.x) / m, rate_of=w_x)
+    b_y = Output("m/s2", "acceleration of the second body along y", (-F_y - S.y) / m, rate_of=w_y)
+    stop_time, step_size, method = 1.0, 0.01, "radau9"
+'''
 # force, direction of the motion from that of the force; friction 2 N, mass 1 kg, speed 1 m/s
 SCENES = [(1.0, pi / 2), (1.9, pi - 1e-6), (0.1, 2.0), (1.999, 1.0), (1e-3, 1.0)]
 
@@ -129,6 +159,35 @@ def test_derivatives_through_stick_and_slip_are_those_of_differences(seed, tmp_p
         exact = [(a - 8.0 * b + 8.0 * c - d) / (12.0 * h) for a, b, c, d in zip(*ends, strict=True)]
         actual = [run[output, name][-1] for output in ("x", "y")]
         assert actual == pytest.approx(exact, rel=1e-5, abs=1e-5 * max(map(abs, exact))), name
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    require_compiler()
+    file = tmp_path_factory.mktemp("models") / "pair.py"
+    file.write_text(PAIR)
+    return next(build_user_model(file, "--native", *PLATFORM).rglob("pair.fmu"))
+
+
+@pytest.mark.slow
+def test_derivatives_of_two_bodies_are_those_of_differences_and_turn_with_the_plane(pair):
+    """The second body never leaves the line of its spring, and the first one passes zero on it, where it turns back."""
+    values, outputs = {"f": 2.0, "k": 30.0, "c": 0.3, "v_x0": 1.0}, ["x", "y", "z_x", "z_y"]
+    run = harness.sensitivity(pair, list(values), values, stop=1.0, outputs=outputs)
+    turned_values = {"f": 2.0, "k": 30.0, "c": 0.3, "v_y0": 1.0}
+    turned = harness.sensitivity(pair, list(turned_values), turned_values | {"v_x0": -0.3}, stop=1.0, outputs=outputs)
+    for name, turned_name in zip(values, turned_values, strict=True):
+        assert run["x", name].tolist() == turned["y", turned_name].tolist()
+        assert run["z_y", name].tolist() == (-turned["z_x", turned_name]).tolist()
+        h, ends = 1e-4 * values[name], []
+        for n in (-2, -1, 1, 2):
+            moved = harness.simulate(pair, values | {name: values[name] + n * h}, stop=1.0, rtol=1e-11)
+            ends.append([*moved.events.t[1:], *(moved[output][-1] for output in outputs)])
+        exact = [(a - 8.0 * b + 8.0 * c - d) / (12.0 * h) for a, b, c, d in zip(*ends, strict=True)]
+        times = [event.derivatives[name] for event in run.events]
+        assert [*times, *(run[output, name][-1] for output in outputs)] == pytest.approx(exact, rel=1e-5, abs=1e-6), (
+            name
+        )
 
 
 def test_the_terminal_of_fmi_3_has_both_axes(puck):
