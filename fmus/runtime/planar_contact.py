@@ -175,7 +175,9 @@ def tighten_tolerance(model, step, modes: ContactVector, i: ContactIndex):
     """Tighten the tolerance of a step by which errors turn the slip, or move its rest; see `restore_tolerance`.
 
     Errors of a small slip may be within the tolerance and yet turn it.  A load that is nearly as large as the friction
-    takes long to stop the body, and an error of the slip moves its rest by that much more.
+    takes long to stop the body, and an error of the slip moves its rest by that much more.  Slips that vanish in the
+    shortest steps that a method can resolve are rounding errors: they do not tighten the tolerance, and are a lower
+    limit of the scale of errors, because a body at rest up to now has no other.
     """
     if model.run_tolerance == 0.0:
         model.run_tolerance = step.tolerance
@@ -183,12 +185,15 @@ def tighten_tolerance(model, step, modes: ContactVector, i: ContactIndex):
     size = sqrt(x[i] * x[i] + y[i] * y[i])
     if modes[i] == STUCK or friction[i] == 0.0 or size == 0.0:
         return
+    method = step.active_method
+    y2 = model.rate_magnitudes(step.t0, step.y0, modes)
+    least = RESOLVED * TIME_RESOLUTION * step.t0 * y2
+    method.error_scale_floor = elementwise_max(method.error_scale_floor, least)
     y2 = error_size(step.y0)
-    y2 = elementwise_max(step.active_method.error_scale_floor, y2)
+    y2 = elementwise_max(method.error_scale_floor, y2)
     scales = model.slip_magnitudes(step.t0, y2)
     load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
-    rate_x, rate_y = load_x[i] - friction[i] * x[i] / size, load_y[i] - friction[i] * y[i] / size
-    if size < RESOLVED * TIME_RESOLUTION * step.t0 * sqrt(rate_x * rate_x + rate_y * rate_y):
+    if size < RESOLVED * TIME_RESOLUTION * step.t0 * friction[i]:
         return
     finer = ERROR_SHARE * size / scales[i]
     if load < friction[i] and model.run_tolerance * (1.0 - load / friction[i]) < finer:

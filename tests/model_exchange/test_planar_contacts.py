@@ -190,6 +190,17 @@ def test_derivatives_of_two_bodies_are_those_of_differences_and_turn_with_the_pl
         )
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["radau9", "rodas"])
+def test_a_load_that_only_just_reaches_the_limit_moves_a_body_without_a_stall(pair, method):
+    critical = 0.571426306028844  # m/s: the load of the second body touches its limit
+    for k in range(34, 44, 2):
+        for rtol in (1e-6, 1e-8, 1e-10):
+            values = {"v_x0": critical + 0.05 * 2.0 ** (-0.5 * k)}
+            run = harness.simulate(pair, values, stop=0.25, rtol=rtol, method=method)
+            assert run.events.t[-1] == pytest.approx(0.18908, abs=1e-5)  # the rest of the first body
+
+
 def test_the_terminal_of_fmi_3_has_both_axes(puck):
     if "FMI 2.0" in str(puck):
         pytest.skip("FMI 2.0 has no terminals")
