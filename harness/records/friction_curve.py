@@ -94,7 +94,7 @@ def extract_curve(name: str, table: Table, options: ColumnOptions, columns: Curv
         motions = [part for part in others if part.order == motion.order and part not in forces]
         choice += describe_choice(motion, [motion, *motions], "it comes first", "velocity")
     if columns.force is None and columns.current is None and not is_current:
-        choice += describe_choice(force, [force, *forces], "it has the unit or name of one", "force")
+        choice += describe_choice(force, [force, *forces], "it is named friction, or is the first force", "force")
     return replace(samples, notes=(*table.notes, *choice, *motion_notes, *force_notes, *samples.notes))
 
 

@@ -123,6 +123,26 @@ def test_a_current_becomes_a_torque_by_the_constant_of_the_motor():
     np.testing.assert_allclose([item.value for item in curve.estimates], [item.value for item in direct.estimates])
 
 
+@pytest.mark.parametrize(
+    ("headings", "note"),
+    [
+        (
+            "v [m/s],F [N],G [N]",
+            "Of F [N], G [N], F [N] is used, because it is named friction, or is the first force; ",
+        ),
+        ("v [m/s],w [m/s],F [N]", "Of v [m/s], w [m/s], v [m/s] is used, because it comes first; `velocity` selects"),
+    ],
+)
+def test_a_choice_of_several_columns_names_the_others(tmp_path, headings, note):
+    v = np.outer([1, -1], np.geomspace(0.02, 0.5, 8)).ravel()
+    force = 2 * np.sign(v) + 0.8 * v
+    columns = [v, force, 2 * force] if "G" in headings else [v, 2 * v, force]
+    np.savetxt(tmp_path / "c.csv", np.column_stack(columns), delimiter=",", header=headings, comments="")
+    curve = harness.identify_curve(tmp_path / "c.csv")
+    assert any(text.startswith(note) for text in curve.points.notes)
+    assert curve["F_v"].value == pytest.approx(0.8)
+
+
 def test_a_force_against_the_motion_is_reversed():
     forward, backward = (harness.identify_curve((V, sign * noisy_points(1))) for sign in (1, -1))
     assert backward["F_c"].value == pytest.approx(forward["F_c"].value)
