@@ -248,7 +248,8 @@ def time_to_rest(model, step, i: ContactIndex):
     change = sqrt(
         (load_x2[i] - load_x[i]) * (load_x2[i] - load_x[i]) + (load_y2[i] - load_y[i]) * (load_y2[i] - load_y[i])
     )
-    is_constant = change <= CONSTANT_SHARE * (friction[i] - load)
+    share = CONSTANT_SHARE if size > unresolved else 1.0
+    is_constant = change <= share * (friction[i] - load)
     return duration if is_constant and step.t0 + duration < step.t_end else inf
 
 
