@@ -21,6 +21,7 @@ from .run_state import RunState
 from .step_end import OVERFLOW_LIMIT, TIE_FACTOR
 from .vectors import (
     ContactVector,
+    StateVector,
     all_of,
     any_of,
     contact_indices,
@@ -37,6 +38,7 @@ from .vectors import (
 )
 
 OVERSHOOT_TOLERANCE = 0.1  # slip velocities of the wrong sign up to this share of their terms are overshoot
+UNLIMITED = 1e300
 INDICATOR_OFFSET = 4.0 * EPSILON  # relative to the limit, or to the terms of a slip
 TINY = 1e-300  # absolute offset of velocities and forces
 DEFAULT_NOMINAL = 1e-3  # nominal position (m, rad) and velocity (m/s, rad/s) by default
@@ -65,7 +67,7 @@ class ExchangeBuffers:
         self.nominals = [*y, 0.0] if model.has_driver else [*y]
         self.indicators = [1.0] * (model.n_event_functions + 1)  # the last one is unused: C has no empty arrays
         self.to_rest = self.to_break_away = 1.0
-        self.slip_errors = 0.0  # slips of stuck contacts before an event, which are errors of the importer's solver
+        self.slip_errors = 0.0  # slips against the modes before an event, which are errors of the importer's solver
         self.conditions = [1.0] * (model.n_event_functions - model.first_condition + 1)  # indicators of conditions
         self.driver_rate = self.nominal_velocity = 0.0
         self.states_changed = self.nominals_changed = False
@@ -202,7 +204,9 @@ def update_indicators(run, model):
             force, limit, _sizes, terms = model.contact_forces(solver.t, solver.y, solver.modes)
             if run.phase != EVENT:
                 for i in contact_indices:
-                    exchange.slip_errors[i] = fabs(slips[i]) if solver.modes[i] == STUCK else 0.0
+                    is_monitored = solver.modes[i] == STUCK or not (force[i] == 0.0 and limit[i] == 0.0)
+                    is_error = is_monitored and solver.modes[i] * slips[i] <= 0.0
+                    exchange.slip_errors[i] = fabs(slips[i]) if is_error else 0.0
             for i in contact_indices:
                 if solver.modes[i] != STUCK:
                     if not (force[i] == 0.0 and limit[i] == 0.0):  # without friction, a reversal is no event
@@ -346,7 +350,7 @@ def update_modes(run, model):
                 y = planar_contact.stop_passing(model, step, solver.t, y, solver.modes, i)
                 solver.modes[i] = 1
         y, modes, step.event_location.has_consistent_modes = contact_lcp.resolve_at_start(
-            model, step, solver.t, y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
+            model, step, solver.t, y, solver.modes, tie_tolerance, overshoot_share(run, model, y)
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes
@@ -377,6 +381,20 @@ def update_modes(run, model):
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t
     return needs_restart or changed
+
+
+def overshoot_share(run, model, y: StateVector):
+    """Return up to which share of its terms a slip against its mode is overshoot of the importer's solver.
+
+    What the last indicators showed is overshoot, however large after a fixed step. A larger slip is due to changed
+    values, or to friction that sets in.
+    """
+    slips = model.slip_velocities(run.solver.t, y)
+    for i in contact_indices:
+        is_against = run.solver.modes[i] * slips[i] < 0.0
+        if is_against and (is_planar[i] or fabs(slips[i]) > run.model_exchange.slip_errors[i]):
+            return OVERSHOOT_TOLERANCE
+    return UNLIMITED
 
 
 def next_breakaway(model, solver):

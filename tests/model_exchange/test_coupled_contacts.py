@@ -1,13 +1,17 @@
 """Several contacts integrated by an importer's solver agree with the events of the equations."""
 
+import fmpy
 import numpy as np
 import pytest
+from build_cache import build_user_model
 from contact_references import PROBLEMS, reference_events
 from internal_steps import components, prepared_run, start
 from models import DOP853, LARGER_MODELS
+from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
 from variants import slow_after
 
+import harness
 from fmus.compiler.lowering import lowered_model, model_exchange_run, sibling_module
 
 FILES = {path.stem: path for path in LARGER_MODELS}
@@ -74,3 +78,19 @@ def test_modes_follow_at_the_events_located_by_an_importer(name):
     assert [modes for _, *modes in events] == [modes for _, *modes in true]
     assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-7
     assert np.abs(np.array(final)[: len(end)] - end).max() < 1e-6
+
+
+@pytest.mark.parametrize(("name", "push"), slow_after(1, [("sleds", 12.0), ("sleds", 0.0), ("stacked", 0.0)]))
+def test_coupled_bodies_stick_under_fixed_steps(name, push):
+    """A slip is far beyond zero when a fixed step notices it; the events are those of co-simulation all the same."""
+    require_compiler()
+    fmu = build_user_model(FILES[name], "--native", "--platform", "linux64") / "native" / f"{name}.fmu"
+    time, h, stop = np.linspace(0.0, 10.0, 101), 1e-3, 10.0
+    signal = np.array([*zip(time, push * np.sin(1.3 * time), strict=True)], dtype=[("time", float), ("F_ext", float)])
+    truth = harness.simulate(fmu, inputs={name: signal[name] for name in signal.dtype.names}, times=[stop], stop=stop)
+    options = {"solver": "Euler", "step_size": h, "output_interval": h, "input": signal, "stop_time": stop}
+    names = "x_1", "x_2"
+    end = fmpy.simulate_fmu(fmu, fmi_type="ModelExchange", output=[*names, "events.count"], **options)[-1]
+    assert end["events.count"] == truth.statistics.events
+    for name in names:
+        assert end[name] == pytest.approx(truth[name][-1], rel=1e-2, abs=5.0 * h)
