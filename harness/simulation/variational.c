@@ -18,7 +18,7 @@ enum { REACHED, EVENT, GRAZE, STEP_EVENT, TERMINATED, FAILED, TOO_MANY_STEPS };
 enum { TUNABLE = 1, FIXED };
 enum { WARNING = 1, STAGES = 12, EXTRA = 3, DENSE = 7, SAMPLES = 8, SECTIONS = 60, HALVINGS = 200, LEVELS = 6 };
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 6.0, FLOOR = 1e-6, FLOOR_S = 1e-4, SMALL = 1e-3, CLEAR = 1e-5, GOLDEN = 0.6180339887498949;
-static const double FAR = 1e50; /* an indicator as large as this stands for no event */
+static const double FAR = 1e50;
 
 typedef void *Instance;
 typedef uint32_t Reference;
@@ -303,6 +303,9 @@ static double find_minimum(Run *run, double h, double low, double high, size_t k
 
 static double side(double g) { return g > 0.0 ? 1.0 : -1.0; }
 
+/* Whether the value of an indicator has no size: 1 in FMUs of this project, or very large, stands for no event. */
+static bool has_no_size(double g) { return g == 1.0 || fabs(g) >= FAR; }
+
 /* Search the step just computed for the first change of sign of an indicator: shares of the step around it. Returns
  * REACHED if there is none, and GRAZE if one only touches zero at the share `high`. */
 static int search(Run *run, double h, double *low, double *high, size_t *which)
@@ -317,8 +320,9 @@ static int search(Run *run, double h, double *low, double *high, size_t *which)
     if (!indicators_at(run, run->t + h, run->z1, run->samples + SAMPLES * q)) return FAILED;
     for (size_t k = 0; k < q; k++) {
         double sign = side(run->g[k]), span = 0.0;
-        for (size_t i = 0; i <= SAMPLES; i++) span = fmax(span, fabs(run->samples[i * q + k]));
-        if (span < FAR) run->largest_g[k] = fmax(run->largest_g[k], span);
+        for (size_t i = 0; i <= SAMPLES; i++)
+            if (!has_no_size(run->samples[i * q + k])) span = fmax(span, fabs(run->samples[i * q + k]));
+        run->largest_g[k] = fmax(run->largest_g[k], span);
         for (size_t i = 1; i <= SAMPLES; i++) {
             double g = sign * run->samples[i * q + k], before = sign * run->samples[(i - 1) * q + k];
             double from = (double)(i - 1) / SAMPLES, to = (double)i / SAMPLES;
@@ -484,7 +488,7 @@ static int advance(Run *run, double target)
         memcpy(run->k, run->k + STAGES * n, n * sizeof(double));
         memcpy(run->g, run->samples + SAMPLES * run->q, run->q * sizeof(double));
         for (size_t k = 0; k < run->q; k++)
-            if (fabs(run->g[k]) >= CLEAR * run->largest_g[k]) run->t_far[k] = run->t, run->g_far[k] = run->g[k];
+            if (has_no_size(run->g[k]) || fabs(run->g[k]) >= CLEAR * run->largest_g[k]) run->t_far[k] = run->t, run->g_far[k] = run->g[k];
         int status = complete_step(run);
         if (status != REACHED || found == GRAZE) return status != REACHED ? status : GRAZE;
     }

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from ctypes import byref, c_double, c_int64, c_uint32, c_void_p, cast
 from dataclasses import dataclass
 from io import StringIO
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ from .fmu_archive import DESCRIPTION_FILE, read_leniently
 from .fmu_instance import CALL_FAILURES, FmuInstance, LogCapture
 from .model_data import read_model_data
 from .stepping import TIME
-from .variable_values import REAL_TYPES, find_bound
+from .variable_values import REAL_TYPES, find_bound, variable_unit
 from .variational_loop import (
     EARLY_EVENT,
     EVENT_TERMINATED,
@@ -71,6 +71,7 @@ NEAR = 1e-10  # of the duration: times this close coincide
 TOUCH = 1e-9  # of the largest value of an indicator: one that turns this close to zero touches it
 TIGHTER = 1e-3  # factor of the tolerance that the FMU receives, for its own decisions on events
 FIXED_SHIFT = 1e-2  # of that change, for a parameter that can be set before the start only
+FAR_BELOW = 1e-3  # share of a nominal value below which it is not the usual size of a state
 RESET = 100.0  # in tolerances: smaller changes of the states at the start are errors of rounding
 
 
@@ -183,6 +184,7 @@ class VariationalRun:
         self.modes = tuple(read_model_data(spec.fmu).contacts.values())
         self.update = self.fmu.newDiscreteStates if instance.is_fmi2 else self.fmu.updateDiscreteStates
         self.n, self.m, self.q = len(states), len(parameters), int(description.numberOfEventIndicators or 0)
+        self.usual_sizes = np.full(self.n, inf)
         self.allocate({"states": states, "rates": rates, "inputs": self.inputs})
 
     def allocate(self, groups: dict[str, list[Any]]) -> None:
@@ -373,7 +375,8 @@ class VariationalRun:
         self.run.next_event = update_discrete_states(self.update, self.start)
         self.fmu.enterContinuousTimeMode()
         self.y[:] = self.read("getContinuousStates", self.n)
-        self.arrays["nominals"][: self.n] = self.read("getNominalsOfContinuousStates", self.n)
+        nominals = self.read("getNominalsOfContinuousStates", self.n)
+        self.arrays["nominals"][: self.n] = np.minimum(nominals, self.usual_sizes)
         run = self.run
         run.t, run.h, run.next, run.n_steps, run.n_rhs = self.start, 1e-3 * (self.stop - self.start), 0, 0, 0
         run.is_fresh, run.last_t, run.n_at_once = False, self.start, 0
@@ -400,12 +403,34 @@ class VariationalRun:
         HarnessError
             If the FMU fails, or its equations cannot be integrated or differentiated.
         """
-        try:
-            self.begin()
-            self.integrate(report)
-        finally:
-            self.free_starts()
+        while True:
+            failure = None
+            try:
+                self.begin()
+                self.integrate(report)
+            except HarnessError as error:
+                failure = error
+            finally:
+                self.free_starts()
+            if not self.lower_usual_sizes():
+                break
+        if failure:
+            raise failure
         return self.make_solution()
+
+    def lower_usual_sizes(self) -> bool:
+        """Lower the usual sizes of states that stay far below their nominal values; return whether there are any.
+
+        States of one unit have one size, so that the rounding errors of one that hardly moves are not followed.
+        """
+        largest, nominals = (self.arrays[name][: self.n] for name in ("largest", "nominals"))
+        units, is_lowered = np.array([variable_unit(state) for state in self.states]), False
+        for unit in np.unique(units):
+            group = units == unit
+            size = largest[group].max()
+            if 0.0 < size < FAR_BELOW * nominals[group].max():
+                self.usual_sizes[group], is_lowered = size, True
+        return is_lowered
 
     def integrate(self, report: Callable[[float], object]) -> None:
         """Integrate to the stop, through all events."""

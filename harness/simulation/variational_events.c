@@ -264,7 +264,7 @@ int check_ties(Run *run, int64_t fired, const double *slopes, double speed)
     differences(run, time_shift(run, rates), rates, reach);
     for (size_t k = 0; k < q; k++) {
         reach[k] = fmax(run->largest_g[k], fabs(reach[k]) / SHIFT);
-        if (fabs(values[k]) <= run->graze * reach[k]) near[count++] = k;
+        if (!has_no_size(values[k]) && fabs(values[k]) <= run->graze * reach[k]) near[count++] = k;
     }
     if (!read_point(run, rates, values, modes)) return FAILED;
     if (!count) return REACHED;
@@ -278,8 +278,9 @@ int check_ties(Run *run, int64_t fired, const double *slopes, double speed)
         if ((int64_t)k == fired && fabs(drift) <= run->graze * fabs(speed))
             note(run, run->t, (int64_t)k, UNDECIDED, sides);
         for (size_t i = 0; i < m; i++) {
-            double change = gradient[i] + drift * slopes[i];
-            bool is_zero = fabs(change) * parameter_size(run, i) <= run->graze * reach[k];
+            double by_time = drift * slopes[i], change = gradient[i] + by_time;
+            bool is_zero = fabs(change) * parameter_size(run, i) <= run->graze * reach[k] ||
+                           fabs(change) <= SAME * fmin(fabs(gradient[i]), fabs(by_time));
             sides[i] = is_zero ? 0.0 : isnan(change) ? NAN : (change > 0.0) == (values[k] > 0.0) ? 1.0 : -1.0;
         }
         note(run, run->t, (int64_t)k, TIE, sides);

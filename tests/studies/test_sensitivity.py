@@ -7,7 +7,7 @@ from math import inf
 import mpmath
 import numpy as np
 import pytest
-from build_cache import build_user_model
+from build_cache import ROOT, build_user_model
 from external_fmus import build_external_fmus, edited_copy
 from fmi3_fixtures import build_fmi3_fmus
 from models import MODELS
@@ -290,6 +290,29 @@ def test_derivatives_of_random_models_are_those_of_differences(seed, tmp_path):
         error = np.min([np.abs(s.left[:, i] - one) / size for one in found], axis=0)
         allowed = 1e-8 + 3 * np.min([np.abs(a - b) / size for a, b in pairwise(found)], axis=0)
         assert not np.any(error > allowed), (parameter, error.max())  # NaN: there is no derivative
+
+
+@pytest.mark.parametrize(
+    ("length", "time"),
+    slow_after(2, [(2.0**-40, 1.0), (2.0**30, 1.0), (1.0, 2.0**-30), (1.0, 2.0**20), (2.0**-300, 1.0)]),
+)
+def test_derivatives_do_not_depend_on_the_units_of_length_and_time(length, time):
+    """With units in which all numbers are a power of two larger or smaller."""
+    fmu = build_user_model(ROOT / "fmus/more/forced.py", "--native", "--platform", "linux64") / "native/forced.fmu"
+    names = "m", "k", "f", "P", "Omega"
+    base = dict(zip(names, (1.0, 100.0, 6.0, 10.0, 4.0), strict=True))
+    force, s = length / time**2, [None, None]
+    scales = dict(zip(names, (1.0, 1.0 / time**2, force, force, 1.0 / time), strict=True))
+    for i, units in enumerate((dict.fromkeys(names, 1.0), scales)):
+        span = 8.0 * (time if i else 1.0)
+        values = {name: base[name] * units[name] for name in names}
+        s[i] = harness.sensitivity(fmu, names, values, times=np.linspace(0.0, span, 9)[1:], stop=span)
+    assert [event.text for event in s[1].events] == [event.text for event in s[0].events]
+    assert len(s[0].events) > 10
+    assert s[0].remarks == s[1].remarks == ()
+    for name in names:
+        expected = s[0]["x", name] * length / scales[name]
+        assert s[1]["x", name] == pytest.approx(expected, rel=0.0, abs=1e-10 * np.abs(expected).max())
 
 
 def test_parameters_without_an_effect_are_named_once(capsys):
