@@ -291,7 +291,7 @@ def handle_event(run, model):
             exchange.states_changed = True
         elapsed = next_breakaway(model, solver)
         exchange.t_next_event = solver.start_time + elapsed
-    if model.has_other_laws and has_step_event(run, model):
+    if model.has_other_laws and has_other_modes(run, model):
         solver.modes = model.law_modes(solver.t, solver.y)
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t
@@ -322,10 +322,20 @@ def complete_step(run, model):
 
 
 def has_step_event(run, model):
-    """Return whether a mode differs from that of a law without stick and slip, after a step of the importer's solver.
+    """Return whether an event is due after a step of the importer's solver.
 
-    Such a law has no event indicators: where it chatters, a solver would find a zero of them in every step.
+    A law without stick and slip has no event indicators: where it chatters, a solver would find a zero of them in every
+    step.  The last phase of a slip in a plane follows an event so closely that some solvers do not find its end.
     """
+    solver = run.solver
+    is_due = model.has_other_laws and has_other_modes(run, model)
+    for i in planar_indices:
+        is_due = is_due or planar_contact.ends_last_phase(model, solver.t, solver.y, solver.modes, i)
+    return is_due
+
+
+def has_other_modes(run, model):
+    """Return whether a mode differs from that of a law without stick and slip."""
     solver = run.solver
     if model.has_other_laws and not solver.step.is_hybrid:
         modes = model.law_modes(solver.t, solver.y)

@@ -315,6 +315,12 @@ def is_due(model, t, y: StateVector, i: ContactIndex):
     return model.slip_phase[i] != STUCK and progress(model, t, y, i) <= model.approach[i]
 
 
+def ends_last_phase(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+    """Return whether a slip that rests or passes zero is due."""
+    phase = model.slip_phase[i]
+    return modes[i] != STUCK and (phase == RESTING or phase == PASSING) and is_due(model, t, y, i)
+
+
 def is_near_zero(model, step, t, y: StateVector, i: ContactIndex):
     """Return whether a slip that is due is small, or has passed zero in a step; else it has turned."""
     slips = model.slip_velocities(t, y)

@@ -4,6 +4,7 @@ from math import cos, hypot, pi, radians, sin
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
+import fmpy
 import mpmath
 import pytest
 from build_cache import build_once, build_user_model
@@ -60,6 +61,16 @@ def puck(request):
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
 def test_cvode_brings_a_body_to_rest_as_the_closed_form_says(puck, F, phi, rtol):
     assert max(planar_contacts.exchange_errors(puck, 1.0, F, 2.0, 1.0, phi, rtol=rtol)) < 100.0
+
+
+@pytest.mark.parametrize("h", slow_after(1, [1e-3, 1e-4, 3e-4]))
+def test_a_body_rests_under_fixed_steps(puck, h):
+    """Two events may be so close that fmpy's method of Euler does not find the second one."""
+    truth = harness.simulate(puck, times=[1.3], stop=1.3)
+    options = {"solver": "Euler", "step_size": h, "output_interval": h, "stop_time": 1.3, "output": ["x", "y", "mode"]}
+    end = fmpy.simulate_fmu(puck, fmi_type="ModelExchange", **options)[-1]
+    assert (end["mode"], truth["mode"][-1]) == (0, 0)
+    assert (end["x"], end["y"]) == pytest.approx((truth["x"][-1], truth["y"][-1]), abs=2.0 * h)
 
 
 @pytest.mark.slow
