@@ -368,6 +368,7 @@ def test_of_several_columns_the_one_that_varies_most_is_used(tmp_path, headings,
         ("t,x,b", "Of x, b, x is used, because its name is that of a position; `column` selects another."),
         ("t [s],x [m],y [mm]", "Of x [m], y [mm], x [m] is used, because its name is that of a position; "),
         ("t [s],x [m],v [m/s]", ""),
+        ("when,x [m],v [m/s]", "when is used as time; `time` selects another column."),
     ],
 )
 def test_a_choice_by_name_or_unit_names_what_else_may_be_the_motion(tmp_path, headings, note):

@@ -21,6 +21,8 @@ def test_the_map_of_the_belt_has_the_edges_of_closed_forms():
     assert {(edge.below, edge.above) for edge in result.edges} == {(both, steady)}
     for edge, c in zip(result.edges, over["c"], strict=True):
         assert edge.point == pytest.approx((c, edge_of_stick_slip(c)), rel=1e-11)
+    *_, curve = result.plot()[0].lines  # which joins the edges
+    assert {tuple(point) for point in curve.get_xydata()} == {edge.point for edge in result.edges}
     shared = harness.map_motions(native("belt"), over, {"law": "coulomb"}, workers=2)
     assert shared.edges == result.edges
 
