@@ -1,6 +1,6 @@
 """Motions of a native FMU from given states, in coordinates that repeat in a periodic motion.
 
-The coordinates c = B^T y leave out translations that change no force, as of a sled together with its driver, and the
+The coordinates that repeat leave out translations that change no force, as of a sled together with its driver, and the
 phase angle of a force.
 """
 
@@ -36,7 +36,7 @@ MAX_STEPS = 200_000  # internal steps of a motion
 MAX_ITERATIONS = 30  # of Newton's method
 SAMPLED = 3  # points of a motion at which derivatives are compared
 PERIODS = 256  # of inputs: more than a motion is followed
-STOP = 1e9  # s: no motion ends there
+STOP = 1e100  # s: no motion ends there
 
 
 class Point(NamedTuple):
@@ -112,8 +112,10 @@ class Oscillator:
         Names of the states and of their rates.
     start : numpy.ndarray
         States (n,) at the start of the source.
-    basis : numpy.ndarray
-        The coordinates that repeat (n, r), B above.
+    rate : float
+        Frequency in 1/s that makes changes of speeds comparable with those of positions.
+    basis, reduction : numpy.ndarray
+        Changes of the states (n, r) by the coordinates that repeat, and these by the states (r, n).
     phase : int or None
         Index of the state that is the phase angle of a force, or its clock.
     sets_phase : bool
@@ -352,11 +354,9 @@ class Oscillator:
         if self.phase is not None and not self.matrix[self.phase].any():
             self.find_phase_parameter(self.phase, states[0])
         self.sets_phase = self.phase is not None and bool(self.matrix[self.phase].any())
-        kept = [i for i in range(n) if i != self.phase]
-        _, sizes, rows = np.linalg.svd(np.concatenate(jacobians)[:, kept])
-        rank = int(np.count_nonzero(sizes > 1e-10 * sizes[0]))
-        self.basis = np.zeros((n, rank))
-        self.basis[kept] = np.eye(rank) if rank == len(kept) else rows[:rank].T
+        kept = np.arange(n) != self.phase
+        self.basis = np.eye(n)[:, kept & (self.speeds > 0.0)]
+        self.basis = np.hstack([self.find_basis(np.concatenate(jacobians), kept & (self.speeds == 0.0)), self.basis])
         measured = np.flatnonzero(self.basis.any(axis=1) & ~is_constant)
         if not len(measured):
             raise HarnessError(f"{name} has no force that depends on a position or a speed, and so no oscillations")
@@ -367,9 +367,23 @@ class Oscillator:
         set_by = np.column_stack([self.basis, np.eye(n)[:, phases[: int(self.sets_phase)]]])
         reduced = set_by.T @ self.matrix
         self.inverse = np.linalg.pinv(reduced) @ set_by.T  # translations stay as they are at the start
+        stiffness = np.abs(jacobians[:, self.speeds > 0.0][:, :, self.speeds == 0.0]).max(initial=0.0)
+        self.rate = float(np.sqrt(stiffness)) or 1.0
+        scales = np.where(self.basis.T @ self.speeds > 0.0, self.rate, 1.0)
+        self.basis, self.reduction = self.basis * scales, self.basis.T / scales[:, None]
         for state, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
             if np.abs(missing).max() > 1e-9:
                 raise self.has_no_start(state)
+
+    def find_basis(self, jacobian: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        """Return the coordinates (n, r) of some of the states, without their translations, which change no rate."""
+        columns = jacobian[:, kept]
+        scales = np.linalg.norm(columns, axis=0)
+        scales[scales == 0.0] = 1.0
+        _, sizes, rows = np.linalg.svd(columns / scales)
+        rank = int(np.count_nonzero(sizes > 1e-10 * sizes.max(initial=0.0)))
+        rows = np.eye(len(scales)) if rank == len(scales) else np.linalg.qr((rows[:rank] * scales).T)[0].T
+        return np.eye(len(kept))[:, kept] @ rows.T
 
     def has_no_start(self, state: str) -> HarnessError:
         """Return the error of a model without a parameter that sets a state."""
@@ -407,7 +421,7 @@ class Oscillator:
 
     def reduce(self, y: np.ndarray) -> np.ndarray:
         """Return the coordinates (r,) of states or rates."""
-        return np.asarray(self.basis.T @ y)
+        return np.asarray(self.reduction @ y)
 
     def measure(self, y: np.ndarray) -> float:
         """Return the value, without translations, of the state that measures a motion."""
@@ -427,16 +441,17 @@ class Oscillator:
         for y in chain([] if self.last_equilibrium is None else [self.last_equilibrium], self.sliding_states()):
             for _ in range(MAX_ITERATIONS):
                 point = self.begin(y)
-                matrix = self.basis.T @ self.read_jacobian() @ self.basis
+                matrix = self.reduction @ self.read_jacobian() @ self.basis
                 if point.sticks or not matrix.any():
                     break
                 change = self.basis @ np.linalg.lstsq(matrix, -self.reduce(point.f), rcond=None)[0]
-                if np.abs(change).max() <= 1e-15 * np.abs(y).max():
+                if np.abs(self.reduce(change)).max() <= 1e-15 * np.abs(self.reduce(y)).max():
                     break
                 y = y + change
-            scale = max(1e-3, float(np.abs(point.f).max()))
-            if not point.sticks and np.abs(self.reduce(point.f)).max() <= 1e-10 * scale:
-                steady = SteadySliding(y, np.linalg.eigvals(matrix))
+            steady = SteadySliding(y, np.linalg.eigvals(matrix))
+            size = max(float(np.abs(self.reduce(states)).max()) for states in (y, self.start))
+            smallest = 1e-10 * float(np.abs(steady.eigenvalues).max()) * size
+            if not point.sticks and matrix.any() and np.abs(self.reduce(point.f)).max() <= smallest:
                 self.begin(y)
                 if not self.step(0.0, min(STOP, 1.0 / float(np.abs(steady.eigenvalues).max()))).n_changes:
                     # it slides on, with a speed that is not zero by rounding

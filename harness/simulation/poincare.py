@@ -1,9 +1,9 @@
 """Return maps of an oscillator, and its periodic orbits.
 
-An orbit of period T from states y solves B^T (Y(T; y) - y) = 0 with the coordinates B of oscillator.py, by Newton's
-method with the derivatives of Y through all events. The eigenvalues of B^T Y_y B are its Floquet multipliers; that of
-the direction of motion, which is 1 without a force, is left out. An orbit that sticks has a multiplier zero: a cycle
-from one end of sticking to the next is exact.
+An orbit of period T from states y solves R (Y(T; y) - y) = 0 with the reduction R of oscillator.py, by Newton's method
+with the derivatives of Y through all events. The eigenvalues of R Y_y B, with the basis B, are its Floquet multipliers;
+that of the direction of motion, which is 1 without a force, is left out. An orbit that sticks has a multiplier zero: a
+cycle from one end of sticking to the next is exact.
 
 References
 ----------
@@ -184,6 +184,7 @@ class ReturnMap:
             If it does not converge.
         """
         oscillator, basis, guess = self.oscillator, self.oscillator.basis, period
+        rate = oscillator.rate
         speed = float(np.abs(oscillator.reduce(oscillator.begin(y).f)).max())
         is_free = not oscillator.is_forced
         for _ in range(MAX_ITERATIONS):
@@ -191,7 +192,7 @@ class ReturnMap:
                 end, slopes = oscillator.differentiate(y, period)
             except HarnessError as error:  # states far from all motions
                 raise NoOrbitError(f"Newton's method does not converge: {error}") from None
-            monodromy = basis.T @ slopes @ basis
+            monodromy = oscillator.reduction @ slopes @ basis
             residual, scale = oscillator.reduce(end - y), float(np.abs(oscillator.reduce(y)).max()) or 1.0
             size = float(np.abs(residual).max())
             matrix = monodromy - np.eye(len(monodromy))
@@ -200,16 +201,17 @@ class ReturnMap:
                 if np.abs(flow).max() < COLLAPSED * speed:
                     raise NoOrbitError("Newton's method ends in steady sliding")
                 ahead = oscillator.reduce(oscillator.begin(end).f)
-                matrix = np.block([[matrix, ahead[:, None]], [flow, np.zeros(1)]])
+                matrix = np.block([[matrix, ahead[:, None] / rate], [flow / rate, np.zeros(1)]])
                 residual = np.append(residual, 0.0)
             if not np.isfinite(matrix).all():
                 break
             change = np.linalg.lstsq(matrix, -residual, rcond=1e-12)[0]
-            if size <= 1e-3 * REPEATS * scale and np.abs(change).max() <= REPEATS * scale:
+            moved, delay = basis @ change[: len(monodromy)], float(change[-1]) / rate if is_free else 0.0
+            largest = np.abs(change[: len(monodromy)]).max()
+            if size <= 1e-3 * REPEATS * scale and largest <= REPEATS * scale and abs(delay) <= REPEATS * period:
                 break
-            y = y + basis @ change[: len(monodromy)]
-            period += float(change[-1]) if is_free else 0.0
-            if not (np.abs(change[: len(monodromy)]).max() <= scale and 0.1 * guess < period < 10.0 * guess):
+            y, period = y + moved, period + delay
+            if not (largest <= scale and 0.1 * guess < period < 10.0 * guess):
                 raise NoOrbitError("Newton's method does not converge")
         return self.measure_orbit(y, period, self.select_multipliers(monodromy))
 

@@ -59,6 +59,7 @@ typedef struct {
     size_t n_times, next;
     double *values;
     const uint32_t *output_states; /* indices of the states that the outputs are, or NULL */
+    const int64_t *positions;      /* index of the state whose rate a state is, or -1 */
     int64_t indicator;
     bool is_fresh; /* the first stage and the indicators belong to the present point */
     /* events, see variational_events.c */
@@ -193,16 +194,25 @@ static bool step(Run *run, double h, size_t m)
     return true;
 }
 
+/* Size of state j below which its errors do not count: a small part of what is usual, and of a speed, a small part of the
+ * one that moves its position by its largest value in the whole run. */
+static double smallest_size(const Run *run, size_t j)
+{
+    double size = FLOOR * run->nominals[j];
+    int64_t position = run->positions[j];
+    return position < 0 ? size : fmax(size, FLOOR * run->largest[position] / run->duration);
+}
+
 /* Typical size of component j of z: its largest value up to now, but not less than a small part of what is usual. */
 static double size_of(const Run *run, size_t j)
 {
     size_t n = run->n, own = j % n, first = j - own;
     double size = fmax(run->largest[j], fabs(run->z1[j])), relative = 0.0;
-    double state = fmax(fmax(run->largest[own], fabs(run->z1[own])), FLOOR * run->nominals[own]);
+    double state = fmax(fmax(run->largest[own], fabs(run->z1[own])), smallest_size(run, own));
     if (first == 0) return state;
     for (size_t l = 0; l < n; l++)
         relative = fmax(relative, fmax(run->largest[first + l], fabs(run->z1[first + l])) /
-                                      fmax(run->largest[l], FLOOR * run->nominals[l]));
+                                      fmax(run->largest[l], smallest_size(run, l)));
     double value = run->parameters[first / n - 1].value;
     return fmax(size, fmax(SMALL * relative, value != 0.0 ? FLOOR_S / fabs(value) : 0.0) * state);
 }

@@ -192,12 +192,13 @@ class VariationalRun:
         from scipy.integrate import DOP853
 
         instance, n, m, q, is_fmi2 = self.instance, self.n, self.m, self.q, self.instance.is_fmi2
-        size = max(n * (1 + m), 1)
+        size, rates = max(n * (1 + m), 1), groups["rates"]
         self.times = np.asarray(self.spec.times, dtype=float)
         self.arrays: dict[str, np.ndarray] = {
             "k": np.zeros((EXTENDED, size)),
             "dense": np.zeros((DENSE, size)),
             "nominals": np.ones(max(n, 1)),
+            "positions": np.array([rates.index(state) if state in rates else -1 for state in groups["states"]]),
             "samples": np.zeros((SAMPLES, max(q, 1))),
             "work": np.zeros(len(self.inputs) + 2 * n + 3),
             "times": self.times,

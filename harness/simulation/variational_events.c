@@ -12,7 +12,6 @@ static const double SAME = 1e-5;       /* relative difference of derivatives tha
 static const double RESET = 100.0; /* in tolerances: smaller changes of the states at an event are errors of integration */
 /* Shares of the largest change of a rate at an event: of one that changes; of a derivative, which is an error then */
 static const double CHANGED = 1e-6, CANCELLED = 1e-5;
-static const double SMALLEST = 1e-6; /* of the nominal value: usual size of a state */
 
 typedef struct {
     int needed, terminate, nominals, values, defined;
@@ -97,7 +96,7 @@ static bool read_point(Run *run, double *rates, double *indicators, int64_t *mod
 }
 
 /* Largest value of state j up to now, if it is not tiny. */
-static double usual_size(const Run *run, size_t j) { return fmax(run->largest[j], SMALLEST * run->nominals[j]); }
+static double usual_size(const Run *run, size_t j) { return fmax(run->largest[j], smallest_size(run, j)); }
 
 static double parameter_size(const Run *run, size_t i)
 {
@@ -158,10 +157,11 @@ static int indicators_from(Run *run, void *start, const double *rates, double ah
     return indicators_at(run, run->t, run->z, result) ? REACHED : FAILED;
 }
 
-static bool are_close(const double *a, const double *b, size_t n, double relative, double absolute)
+/* Whether values (q) of the indicators agree, but for rounding errors of these sizes. */
+static bool are_close(const Run *run, const double *a, const double *b, double relative, const double *sizes)
 {
-    for (size_t k = 0; k < n; k++)
-        if (!(fabs(a[k] - b[k]) <= absolute + relative * fabs(b[k]))) return false;
+    for (size_t k = 0; k < run->q; k++)
+        if (!(fabs(a[k] - b[k]) <= 1e-12 * sizes[k] + relative * fabs(b[k]))) return false;
     return true;
 }
 
@@ -172,14 +172,14 @@ static int fixed_slopes(Run *run, size_t i, const double *rates, bool is_before,
     size_t q = run->q;
     const Parameter *parameter = run->parameters + i;
     double ahead = (is_before ? -10.0 : 10.0) * time_shift(run, rates), next_event = run->next_event;
-    double values[q + 1], base[q + 1], near[q + 1], far[q + 1], ends[4][q + 1], largest = 0.0, e = parameter->change;
+    double values[q + 1], base[q + 1], near[q + 1], far[q + 1], ends[4][q + 1], sizes[q + 1], e = parameter->change;
     *is_known = false;
     for (size_t l = 0; l < (parameter->side ? 3 : 5); l++)
         if (!parameter->starts[l]) return REACHED;
     if (!indicators_at(run, run->t, run->z, values)) return FAILED;
     void *saved = save(run);
     int status = saved ? indicators_from(run, parameter->starts[0], rates, ahead, base) : NO_SAVED_STATE;
-    if (status == REACHED && are_close(base, values, q, 1e-9, 1e-12)) {
+    if (status == REACHED && are_close(run, base, values, 1e-9, run->largest_g)) {
         for (size_t l = 0; l < 4 && status == REACHED; l++)
             if (parameter->starts[1 + l]) status = indicators_from(run, parameter->starts[1 + l], rates, ahead, ends[l]);
         for (size_t k = 0; k < q && status == REACHED; k++) {
@@ -190,9 +190,9 @@ static int fixed_slopes(Run *run, size_t i, const double *rates, bool is_before,
                 near[k] = (ends[0][k] - ends[2][k]) / e, far[k] = (ends[1][k] - ends[3][k]) / (2.0 * e);
                 slopes[k] = (4.0 * near[k] - far[k]) / 3.0;
             }
-            largest = fmax(largest, fabs(far[k]));
+            sizes[k] = run->largest_g[k] / fabs(e);
         }
-        *is_known = status == REACHED && are_close(near, far, q, 1e-3, 1e-6 * largest);
+        *is_known = status == REACHED && are_close(run, near, far, 1e-3, sizes);
     }
     run->next_event = next_event;
     if (saved && !restore(run, saved)) status = FAILED;

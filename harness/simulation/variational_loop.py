@@ -85,7 +85,7 @@ class RunStruct(Structure):
         ("n_times", c_size_t),
         ("next", c_size_t),
         ("values", c_void_p),
-        ("output_states", c_void_p),
+        *((name, c_void_p) for name in ("output_states", "positions")),
         ("indicator", c_int64),
         ("is_fresh", c_bool),
         *((name, c_void_p) for name in ("influenced", "modes")),

@@ -26,6 +26,7 @@ from .result import OrbitResult, SpecialPoint
 PATH_POINTS = 400  # at least, of an orbit in the phase plane
 ENDS, BEGINS = "ends", "begins"
 NEAR = 1e-6  # relative difference of orbits that are the same
+MAX_RESTARTS = 16  # of the bisection on whether a motion is found
 
 
 class BranchTracer:
@@ -175,8 +176,13 @@ class BranchTracer:
         for motion in one if not (self.oscillator.is_one_body and any(item.kind == STEADY for item in two)) else ():
             if motion.kind != STEADY and motion.name not in names:
                 tracked, n_remarks = TrackedMotion(self, motion), len(self.remarks)
-                ((edge, end, *_),) = find_edges(tracked.move_to, motion.value, value, True, False)
-                if end == value and tracked.move_to(value):
+                end, is_found = motion.value, True
+                for _ in range(MAX_RESTARTS):  # found from nearby, where it was not found from far away
+                    if end == value or not is_found:
+                        break
+                    ((edge, end, *_),) = find_edges(tracked.move_to, end, value, True, False)
+                    is_found = tracked.move_to(end)
+                if end == value and is_found:
                     two.append(tracked.motion)
                 else:
                     how = "bisection on whether it is found"
