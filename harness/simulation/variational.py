@@ -198,7 +198,7 @@ class VariationalRun:
             "k": np.zeros((EXTENDED, size)),
             "dense": np.zeros((DENSE, size)),
             "nominals": np.ones(max(n, 1)),
-            "positions": np.array([rates.index(state) if state in rates else -1 for state in groups["states"]]),
+            "positions": np.array([rates.index(item) if item in rates else -1 for item in groups["states"]], np.int64),
             "samples": np.zeros((SAMPLES, max(q, 1))),
             "work": np.zeros(len(self.inputs) + 2 * n + 3),
             "times": self.times,
