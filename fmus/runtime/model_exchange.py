@@ -38,7 +38,7 @@ from .vectors import (
 )
 
 OVERSHOOT_TOLERANCE = 0.1  # slip velocities of the wrong sign up to this share of their terms are overshoot
-UNLIMITED = 1e300
+UNLIMITED = 1e300  # the same for slips of which the importer has seen that they are overshoot
 INDICATOR_OFFSET = 4.0 * EPSILON  # relative to the limit, or to the terms of a slip
 TINY = 1e-300  # absolute offset of velocities and forces
 DEFAULT_NOMINAL = 1e-3  # nominal position (m, rad) and velocity (m/s, rad/s) by default

@@ -183,8 +183,8 @@ class ReturnMap:
         NoOrbitError
             If it does not converge.
         """
-        oscillator, basis, guess = self.oscillator, self.oscillator.basis, period
-        rate = oscillator.rate
+        oscillator, guess = self.oscillator, period
+        basis, rate = oscillator.basis, oscillator.rate
         speed = float(np.abs(oscillator.reduce(oscillator.begin(y).f)).max())
         is_free = not oscillator.is_forced
         for _ in range(MAX_ITERATIONS):

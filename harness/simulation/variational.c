@@ -18,7 +18,7 @@ enum { REACHED, EVENT, GRAZE, STEP_EVENT, TERMINATED, FAILED, TOO_MANY_STEPS };
 enum { TUNABLE = 1, FIXED };
 enum { WARNING = 1, STAGES = 12, EXTRA = 3, DENSE = 7, SAMPLES = 8, SECTIONS = 60, HALVINGS = 200, LEVELS = 6 };
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 6.0, FLOOR = 1e-6, FLOOR_S = 1e-4, SMALL = 1e-3, CLEAR = 1e-5, GOLDEN = 0.6180339887498949;
-static const double FAR = 1e50;
+static const double FAR = 1e50; /* an indicator as large as this stands for no event */
 
 typedef void *Instance;
 typedef uint32_t Reference;
@@ -313,8 +313,8 @@ static double find_minimum(Run *run, double h, double low, double high, size_t k
 
 static double side(double g) { return g > 0.0 ? 1.0 : -1.0; }
 
-/* Whether the value of an indicator has no size: 1 in FMUs of this project, or very large, stands for no event. */
-static bool has_no_size(double g) { return g == 1.0 || fabs(g) >= FAR; }
+/* Whether an indicator has the value that stands for no event, and is no measure of its size: 1 in FMUs of this project. */
+static bool stands_for_no_event(double g) { return g == 1.0 || fabs(g) >= FAR; }
 
 /* Search the step just computed for the first change of sign of an indicator: shares of the step around it. Returns
  * REACHED if there is none, and GRAZE if one only touches zero at the share `high`. */
@@ -331,7 +331,7 @@ static int search(Run *run, double h, double *low, double *high, size_t *which)
     for (size_t k = 0; k < q; k++) {
         double sign = side(run->g[k]), span = 0.0;
         for (size_t i = 0; i <= SAMPLES; i++)
-            if (!has_no_size(run->samples[i * q + k])) span = fmax(span, fabs(run->samples[i * q + k]));
+            if (!stands_for_no_event(run->samples[i * q + k])) span = fmax(span, fabs(run->samples[i * q + k]));
         run->largest_g[k] = fmax(run->largest_g[k], span);
         for (size_t i = 1; i <= SAMPLES; i++) {
             double g = sign * run->samples[i * q + k], before = sign * run->samples[(i - 1) * q + k];
@@ -498,7 +498,8 @@ static int advance(Run *run, double target)
         memcpy(run->k, run->k + STAGES * n, n * sizeof(double));
         memcpy(run->g, run->samples + SAMPLES * run->q, run->q * sizeof(double));
         for (size_t k = 0; k < run->q; k++)
-            if (has_no_size(run->g[k]) || fabs(run->g[k]) >= CLEAR * run->largest_g[k]) run->t_far[k] = run->t, run->g_far[k] = run->g[k];
+            if (stands_for_no_event(run->g[k]) || fabs(run->g[k]) >= CLEAR * run->largest_g[k])
+                run->t_far[k] = run->t, run->g_far[k] = run->g[k];
         int status = complete_step(run);
         if (status != REACHED || found == GRAZE) return status != REACHED ? status : GRAZE;
     }

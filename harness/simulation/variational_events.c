@@ -264,7 +264,7 @@ int check_ties(Run *run, int64_t fired, const double *slopes, double speed)
     differences(run, time_shift(run, rates), rates, reach);
     for (size_t k = 0; k < q; k++) {
         reach[k] = fmax(run->largest_g[k], fabs(reach[k]) / SHIFT);
-        if (!has_no_size(values[k]) && fabs(values[k]) <= run->graze * reach[k]) near[count++] = k;
+        if (!stands_for_no_event(values[k]) && fabs(values[k]) <= run->graze * reach[k]) near[count++] = k;
     }
     if (!read_point(run, rates, values, modes)) return FAILED;
     if (!count) return REACHED;
