@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...results.files import column_heading
 from ...results.provenance import describe_sources
 from ...results.result import Result
 from ...results.summary import ResultColumn, ResultTable
@@ -97,7 +98,9 @@ class MapResult(Result):
         ]
 
     def _columns(self) -> tuple[ResultColumn, ...]:
-        values = [ResultColumn(f"{name} [{unit}]", partial(format_value, name)) for name, unit in self.units.items()]
+        values = [
+            ResultColumn(column_heading(name, unit), partial(format_value, name)) for name, unit in self.units.items()
+        ]
         return (
             *values,
             ResultColumn("below", "{0[below]}", is_text=True),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import HarnessError
+from ...results.files import column_heading
 from ...results.provenance import describe_sources
 from ...results.result import Result
 from ...results.summary import ResultColumn, ResultTable
@@ -112,12 +113,12 @@ class OrbitResult(Result):
         return ResultTable(self._rows(), self._motion_columns())
 
     def _motion_columns(self) -> tuple[ResultColumn, ...]:
-        value = ResultColumn(f"{self.parameter} [{self.unit}]", f"{{0[{self.parameter}]:.6g}}")
+        value = ResultColumn(column_heading(self.parameter, self.unit), f"{{0[{self.parameter}]:.6g}}")
         return (
             *[value] * bool(self.parameter),
             ResultColumn("motion", lambda row: f"{row['stability']} {row['motion']}".strip(), is_text=True),
             ResultColumn("period [s]", "{0[period]:.8g}"),
-            ResultColumn(f"amplitude [{self.coordinate_unit}]", "{0[amplitude]:.6g}"),
+            ResultColumn(column_heading("amplitude", self.coordinate_unit), "{0[amplitude]:.6g}"),
             ResultColumn("stick [s]", "{0[stick_time]:.6g}"),
             ResultColumn("sticks", "{0[sticks]}"),
             ResultColumn("multiplier", "{0[multiplier]:.4g}"),
@@ -125,7 +126,7 @@ class OrbitResult(Result):
 
     def _point_columns(self) -> tuple[ResultColumn, ...]:
         return (
-            ResultColumn(f"{self.parameter} [{self.unit}]", "{0.value:.12g}"),
+            ResultColumn(column_heading(self.parameter, self.unit), "{0.value:.12g}"),
             ResultColumn("what happens", "{0.kind}", is_text=True),
             ResultColumn("located by", "{0.how}", is_text=True),
         )
