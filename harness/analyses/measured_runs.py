@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError, check_names
-from ..process.temporary_directory import temporary_directory
 from ..scenes.roles import find_roles
 from ..scenes.run_spec import RunSpec
 from ..simulation.fmu_archive import read_description, resolve_time_span
@@ -345,7 +344,7 @@ def open_runner(runs: SweepSpec) -> Iterator[Runner]:
 
 
 BUSY = Lock()  # a pythonfmu FMU must be used by one thread at a time
-LOADED: dict[tuple[str, str], Runner] = {}  # the runner of the current sweep, by its specification and FMU
+LOADED: dict[str, Runner] = {}  # the runner of the current sweep, by its specification
 RESOURCES = ExitStack()  # of this runner
 
 
@@ -368,14 +367,10 @@ class BlockResult:
     seconds: float
 
 
-def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> BlockResult | None:
-    """Run a block with the FMU of this digest; return None if that FMU is neither loaded nor passed in `fmu`."""
+def run_block(points: np.ndarray, runs: SweepSpec) -> BlockResult:
+    """Run a block, with the runner of the previous one if it belongs to the same sweep."""
     with BUSY:
-        runner = LOADED.get((repr(runs), digest))
-        if not runner:
-            if not fmu:
-                return None
-            runner = load(runs, digest, fmu)
+        runner = LOADED.get(repr(runs)) or load(runs)
         start = perf_counter()
         values, messages = np.full((len(points), len(runner.columns)), np.nan), {}
         for i, point in enumerate(points.tolist()):
@@ -387,13 +382,10 @@ def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> B
         return BlockResult(values, messages, perf_counter() - start)
 
 
-def load(runs: SweepSpec, digest: str, fmu: bytes) -> Runner:
+def load(runs: SweepSpec) -> Runner:
     """Load the runner of another sweep and free the previous one."""
     free()
-    file = RESOURCES.enter_context(temporary_directory("sweep-")) / f"{runs.run.model}.fmu"
-    file.write_bytes(fmu)
-    local = replace(runs, run=replace(runs.run, fmu=file))
-    LOADED[repr(runs), digest] = runner = RESOURCES.enter_context(open_runner(local))
+    LOADED[repr(runs)] = runner = RESOURCES.enter_context(open_runner(runs))
     return runner
 
 
@@ -403,6 +395,6 @@ def free() -> None:
 
 
 def unload() -> None:
-    """Free the instance and remove its files."""
+    """Free the instance of the current sweep."""
     with BUSY:
         free()

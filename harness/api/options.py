@@ -35,12 +35,6 @@ def reporter(progress: Progress | bool | None) -> Progress:
     return progress if callable(progress) else QUIET
 
 
-def check_workers(workers: int | None, scheduler: str | None) -> None:
-    """Raise SceneError for a number of workers beside a cluster."""
-    if workers is not None and scheduler is not None:
-        raise SceneError("workers has no effect with scheduler, whose cluster has its own workers: leave one out")
-
-
 def check_time_range(time: str | None, rate: float | None, begin: float | None, end: float | None) -> None:
     """Raise SceneError if the options for the times of a record exclude each other."""
     if rate is not None and time is not None:

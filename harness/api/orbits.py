@@ -18,7 +18,7 @@ from ..arguments import (
     mapping,
 )
 from ..errors import SceneError, option_text
-from .options import check_workers, reporter, with_progress_bar
+from .options import reporter, with_progress_bar
 from .runs import read_input_columns
 
 if TYPE_CHECKING:
@@ -106,7 +106,6 @@ def orbit(
     measure=TEXT,
     levels=INCREASING_ROW,
     workers=WORKERS,
-    scheduler=TEXT,
     progress=PROGRESS,
 )
 @with_progress_bar
@@ -121,7 +120,6 @@ def map_motions(
     measure: str | None = None,
     levels: "ArrayLike | None" = None,
     workers: int | None = None,
-    scheduler: str | None = None,
     progress: Progress | bool | None = None,
 ) -> "MapResult":
     """Map what the motions of a model end in over one or two parameters, with exact edges between the regions.
@@ -148,8 +146,6 @@ def map_motions(
     workers : int, optional
         Number of worker processes; by default all runs are done in this process, and by the command in one process for
         each processor.
-    scheduler : str, optional
-        Address of a Dask cluster, as ``"tcp://host:8786"``.
 
     Returns
     -------
@@ -171,7 +167,6 @@ def map_motions(
     from ..studies.motion_map.study import MapRequest, compute_map
 
     axes = expand_axes(over, DEFAULT_GRID, 2)
-    check_workers(workers, scheduler)
     if measure is None and levels is not None:
         raise SceneError(f"{option_text('levels')} has no effect without {option_text('measure')}: name one")
     if measure is not None and (section is not None or period is not None):
@@ -181,7 +176,7 @@ def map_motions(
     request = MapRequest(
         resolve_motion(source, values, inputs), tuple(axes), period, section or "", measure or "", bounds
     )
-    return compute_map(request, tuple(axes.values()), workers, scheduler, reporter(progress))
+    return compute_map(request, tuple(axes.values()), workers, reporter(progress))
 
 
 def resolve_motion(

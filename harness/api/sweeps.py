@@ -15,7 +15,6 @@ from ..arguments import (
     PROGRESS,
     RUNS,
     SETTINGS,
-    TEXT,
     WORKERS,
     Progress,
     Rule,
@@ -24,7 +23,7 @@ from ..arguments import (
     text,
 )
 from ..errors import SceneError, by_interface, import_optional
-from .options import apply_options, check_workers, reporter, with_progress_bar
+from .options import apply_options, reporter, with_progress_bar
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -56,7 +55,6 @@ GRID = mapping(Rule("numbers", lambda values: values), "numbers")  # the axes ch
     timeout=POSITIVE,
     lenient=FLAG,
     workers=WORKERS,
-    scheduler=TEXT,
     folder=PATH,
     name=NAME,
     progress=PROGRESS,
@@ -76,7 +74,6 @@ def sweep(
     timeout: float | None = None,
     lenient: bool = False,
     workers: int | None = None,
-    scheduler: str | None = None,
     folder: "str | Path | None" = None,
     name: str | None = None,
     progress: Progress | bool | None = None,
@@ -105,8 +102,6 @@ def sweep(
     workers : int, optional
         Number of worker processes; by default all runs are done in this process, and by the command in one process for
         each processor.
-    scheduler : str, optional
-        Address of a Dask cluster, as ``"tcp://host:8786"``.
     folder : path, optional
         Folder for results, as the option ``--out``; the files are in ``sweep/NAME`` below it, and an interrupted sweep
         is resumed. By default no file is written.
@@ -137,7 +132,6 @@ def sweep(
     import_optional("xarray", "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
-    check_workers(workers, scheduler)
     if name is not None and folder is None:
         raise SceneError("name has no effect without folder: give the folder for results as well")
     run = RunSpec(find_fmu(str(source)), values=dict(values or {}), follow=False)
@@ -146,9 +140,7 @@ def sweep(
         resume = by_interface("repeat the command to resume", "repeat the call to resume")
         if folder is None:
             resume = "they are lost, because `folder` is not set"
-        result = run_sweep(
-            run, grid, samples, seed, measures, name, directory, scheduler, workers, reporter(progress), resume
-        )
+        result = run_sweep(run, grid, samples, seed, measures, name, directory, workers, reporter(progress), resume)
         result.data  # noqa: B018 - loads it before a temporary folder is removed
     if folder is None:
         result.folder = None

@@ -8,13 +8,11 @@ from ..errors import MAX_VALUE_LENGTH, SceneError
 from .orbit import split_axis
 from .terminal import (
     PERIOD_OPTION,
-    SCHEDULER_OPTION,
     SECTION_OPTION,
     SET_OPTION,
     WORKERS_OPTION,
     SectionedCommand,
     Terminal,
-    refuse_options,
     result_options,
 )
 
@@ -34,11 +32,8 @@ from .terminal import (
 @click.option("--measure", help="Measure of `sweep` whose whole numbers are the regions, as slips or events.")
 @click.option("--levels", help="Values between the regions of the measure, separated by commas.")
 @WORKERS_OPTION
-@SCHEDULER_OPTION
 @result_options
-@click.pass_context
 def map_motions(
-    context: click.Context,
     source: str,
     over: tuple[str, ...],
     values: tuple[str, ...],
@@ -47,7 +42,6 @@ def map_motions(
     measure: str | None,
     levels: str | None,
     workers: int,
-    scheduler: str | None,
     terminal: Terminal,
 ) -> None:
     """Print what the motions of a model end in over one or two parameters, with exact edges between the regions.
@@ -62,8 +56,6 @@ def map_motions(
       friction-fmus map forced --over Omega=2:15:40
       friction-fmus map stickslip --over mu_d=0.3:0.8 --measure slips
     """
-    if scheduler is not None:
-        refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     from ..api import map_motions as compute_map
     from ..results.provenance import describe_sources
     from ..results.result import save_result
@@ -75,8 +67,7 @@ def map_motions(
         raise SceneError("--over names a parameter twice")
     settings = parse_assignments("--set", values)
     with terminal.progress(1) as report:
-        local_workers = None if scheduler else workers
-        compute = partial(compute_map, source, axes, settings, workers=local_workers, scheduler=scheduler)
+        compute = partial(compute_map, source, axes, settings, workers=workers)
         compute = partial(compute, section=section, period=period, measure=measure, progress=partial(report, source))
         compute = partial(compute, levels=None if levels is None else split_numbers(levels))
         folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])

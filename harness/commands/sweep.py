@@ -8,7 +8,6 @@ import click
 from ..arguments import NATURAL, RUNS
 from ..errors import MAX_VALUE_LENGTH, SceneError
 from .terminal import (
-    SCHEDULER_OPTION,
     SET_OPTION,
     WORKERS_OPTION,
     RuleType,
@@ -42,7 +41,6 @@ from .terminal import (
     help="Measures, separated by commas. Default: final, and events if the FMU counts them.",
 )
 @WORKERS_OPTION
-@SCHEDULER_OPTION
 @click.option("--name", help="Name of the result folder.")
 @run_options
 @result_options
@@ -56,7 +54,6 @@ def sweep(
     seed: int,
     measures: str | None,
     workers: int,
-    scheduler: str | None,
     name: str | None,
     run: dict[str, Any],
     terminal: Terminal,
@@ -72,12 +69,10 @@ def sweep(
       friction-fmus sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measures slips,period
       friction-fmus sweep pacejka --vary x_m=0.001:0.1:40:log --measures unsteady,steps
       friction-fmus sweep other.fmu --vary mu=0,0.1,0.2 --measures final,largest
-      friction-fmus sweep coulomb --vary f=0.1:2 --vary k=50:500 --samples 1000 --scheduler tcp://host:8786
+      friction-fmus sweep coulomb --vary f=0.1:2 --vary k=50:500 --samples 1000
     """
     if samples is None:
         refuse_options(context, "without --samples", "seed")
-    if scheduler is not None:
-        refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     from ..api import sweep as sweep_model
     from ..scenes.assignments import parse_assignments
     from ..scenes.fmu_files import find_fmu
@@ -95,8 +90,7 @@ def sweep(
             samples=samples,
             seed=seed,
             measures=measured,
-            workers=None if scheduler else workers,
-            scheduler=scheduler,
+            workers=workers,
             folder=terminal.out,
             name=name,
             progress=partial(report, model),

@@ -117,10 +117,7 @@ SET_OPTION = click.option(
     help="Parameters and start values; those of a scene are replaced. Repeatable.",
 )
 WORKERS_OPTION = click.option(
-    "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
-)
-SCHEDULER_OPTION = click.option(
-    "--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786."
+    "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Number of processes."
 )
 PERIOD_OPTION = click.option(
     "--period",

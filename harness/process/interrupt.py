@@ -5,7 +5,6 @@ Both signals raise KeyboardInterrupt. C callbacks and FMUs in Python may swallow
 """
 
 import atexit
-import logging
 import os
 import signal
 import sys
@@ -54,7 +53,6 @@ def check_interrupt() -> None:
 def record_signal(number: int, frame: Any) -> None:
     """Record a signal without raising; the handler within `defer_signals`."""
     RECEIVED_SIGNALS.append(number)
-    logging.disable()  # Dask would log closed connections
 
 
 @contextmanager

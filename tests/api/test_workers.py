@@ -8,7 +8,6 @@ from build_cache import ROOT
 from logged_process import logged_process, wait_for_end, wait_for_line
 
 pytest.importorskip("xarray")
-pytest.importorskip("distributed")
 
 SWEEP = "harness.sweep('coulomb', {'f': [0.5, 1.0]}, stop=0.2, workers=2, folder='swept')"
 

@@ -58,7 +58,6 @@ OPTIONS_WITHOUT_EFFECT = [
     (["compare", "line.csv", "line.csv", "--stop", 2], "--stop"),
     (["sweep", "smd", "--vary", "m=1,2", "--rtol", 0.5], "--rtol"),
     (["sweep", "smd", "--vary", "m=1,2", "--seed", 5], "--seed"),
-    (["sweep", "smd", "--vary", "m=1,2", "--scheduler", "tcp://127.0.0.1:1", "--workers", 5], "--workers"),
     (["decay", "coulomb", "--unit", "mm"], "--unit"),
     (["decay", "coulomb", "--headings", "t,x"], "--headings"),
     (["decay", "coulomb", "--rate", 100], "--rate"),

@@ -75,7 +75,7 @@ def test_a_command_that_needs_an_extra_names_it(without_extras, user, words, ext
 @pytest.mark.parametrize("form", ["clone", "wheel"])
 def test_the_named_command_adds_an_extra_to_a_clone_and_to_a_wheel(wheel, tmp_path, form):
     """pip finds the extras in the installed project, without an index, and the packages of the extras."""
-    extras = sorted(set(EXTRAS.values()) | {"cluster", "records", "peers", "importers"})
+    extras = sorted(set(EXTRAS.values()) | {"records", "peers", "importers"})
     environment = tmp_path / "environment"
     make_environment(environment, *extras)
     install(["-e", ROOT] if form == "clone" else [wheel], environment)

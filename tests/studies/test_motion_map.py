@@ -71,6 +71,8 @@ def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
     ):
         with pytest.raises(harness.SceneError, match=message):
             harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.7]}, **options)
+    with pytest.raises(harness.HarnessError, match=r"the run with mu_d = 0\.95 failed: mu_d is 0\.95, above"):
+        harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.5, 0.95]}, measure="slips", workers=1)
     with pytest.raises(harness.SceneError, match="is not a whole number: give the levels"):
         harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.7]}, measure="peak_speed")
     levels = harness.map_motions(
@@ -81,18 +83,6 @@ def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
         assert speed + sqrt((frequency * (mu_s - edge.point[0]) * m * g / k) ** 2 + speed**2) == pytest.approx(
             level, rel=1e-4
         )
-
-
-@pytest.mark.slow
-def test_a_map_by_a_cluster_is_the_same():
-    distributed = pytest.importorskip("distributed")
-    source, over, values = native("belt"), {"c": [0.05, 0.1], "v_belt": [0.1, 0.12, 1.5]}, {"law": "coulomb"}
-    options = {"processes": False, "n_workers": 2, "threads_per_worker": 2, "dashboard_address": None}
-    with distributed.LocalCluster("127.0.0.1", protocol="tcp://", **options) as cluster:
-        result = harness.map_motions(source, over, values, scheduler=cluster.scheduler_address)
-    assert result.edges == harness.map_motions(source, over, values).edges
-    with pytest.raises(harness.SceneError, match="workers has no effect with scheduler"):
-        harness.map_motions(source, over, values, workers=2, scheduler="tcp://127.0.0.1:1")
 
 
 @pytest.mark.slow

@@ -256,10 +256,3 @@ def test_one_run_that_works_is_a_sweep(sweep, workers):
         harness.HarnessError, match=r"^all runs of the sweep failed: 4 runs, such as mu_d = 0\.95: mu_d "
     ):
         sweep("stickslip", {"mu_d": [mu_d[0], *mu_d[2:]]}, stop=2.0, workers=workers)
-
-
-def test_an_address_that_is_none_is_refused_and_later_sweeps_run(sweep):
-    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
-    with pytest.raises(harness.HarnessError, match=r"^no scheduler found at x: missing port number"):
-        sweep("smd", {"m": [1.0]}, scheduler="x")
-    assert sweep("smd", {"m": [1.0]}, stop=0.1)["error"].item() == ""

@@ -1,11 +1,8 @@
 """Sweeps that are killed or lose their workers."""
 
 import json
-import logging
 import os
 import signal
-import subprocess
-import sys
 from contextlib import contextmanager
 from functools import partial
 from zipfile import ZipFile
@@ -18,10 +15,7 @@ import pytest
 from logged_process import logged_process, wait_for_end, wait_for_line
 from sweep_results import sweep_folder
 
-from harness import HarnessError, sweep
-from harness.studies.sweep.dispatch import LOG
-
-distributed = pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+from harness import sweep
 
 pytestmark = pytest.mark.slow
 
@@ -106,48 +100,6 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_p
     assert checkpoint_file(tmp_path) is None
     bound = tmp_path / "bound"  # workers use pipes; a socket whose address is a file is no port
     assert "tuple" not in (bound.read_text() if bound.exists() else "")
-
-
-def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path, caplog):
-    """One worker is in this process, the other in a separate one, until the first blocks are finished."""
-    words = ("--no-dashboard", "--nthreads", "2", "--no-nanny")
-    options = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
-    with distributed.LocalCluster("127.0.0.1", protocol="tcp://", **options) as cluster:
-        command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address, *words]
-        environment = os.environ | {"PYTHONPATH": str(build_cache.ROOT)}
-        pipe = subprocess.PIPE
-        with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=pipe, text=True) as worker:
-            next(line for line in worker.stderr if "Registered to" in line)
-
-            kill_times = []
-
-            def kill_worker(record):
-                n_done, _ = record.args
-                if n_done >= 2:
-                    kill_times.append(n_done)
-                    worker.kill()
-                return True
-
-            caplog.set_level(logging.DEBUG, LOG.name)
-            LOG.addFilter(kill_worker)
-            try:
-                done = harness(*SWEEP, "--scheduler", cluster.scheduler_address)
-            finally:
-                LOG.removeFilter(kill_worker)
-                worker.kill()
-    assert (done.returncode, done.stderr) == (0, "")
-    assert kill_times[0] < 100
-    assert files(tmp_path) == undisturbed
-
-
-def test_an_unresponsive_scheduler_is_reported(fmus, monkeypatch):
-    """After 10 s, shortened to 1 s here."""
-    client, address = distributed.Client, "tcp://127.0.0.1:1"
-    monkeypatch.setattr(
-        distributed, "Client", lambda address, timeout, **options: client(address, timeout=timeout / 10, **options)
-    )
-    with pytest.raises(HarnessError, match=f"no scheduler found at {address}"):
-        sweep(fmus / "smd.fmu", {"k": [1.0]}, scheduler=address)
 
 
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(fmus, tmp_path):

@@ -4,9 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from threading import Lock
 from typing import NamedTuple, Protocol
 
@@ -15,12 +13,11 @@ import numpy as np
 from ...analyses.measured_runs import OUTPUT_MEASURES, SweepSpec, open_runner
 from ...errors import HarnessError, SceneError, check_names
 from ...process.interrupt import check_interrupt
-from ...process.temporary_directory import temporary_directory
 from ...process.workers import open_workers
 from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
 from ...simulation.edges import find_edges
-from ...simulation.fmu_archive import PROCESS_RESOURCES, declared_parameters, exposes_solver_steps, read_description
+from ...simulation.fmu_archive import declared_parameters, exposes_solver_steps, read_description
 from ...simulation.motion import SLIDING_ORBIT, STEADY, STICK_SLIP, count_text
 from ...simulation.native_equivalent import native_equivalent, native_with_derivatives
 from ...simulation.oscillator import Oscillator, SteadySliding, open_oscillator
@@ -175,38 +172,45 @@ def open_labels(request: MapRequest) -> Iterator[Labels]:
             yield ReturnLabels(SavedStateMotion(request.spec, request.names, request.section, resources))
 
 
-def search_points(labels: Labels, points: np.ndarray) -> Line:
-    """Label the points (n, axes) of a line, of which one coordinate varies, and bisect between different ones."""
+def search_points(labels: Labels, points: np.ndarray, axes: tuple[str, ...]) -> Line:
+    """Label the points (n, axes) of a line, of which one coordinate varies, and bisect between different ones.
+
+    Raises
+    ------
+    HarnessError
+        If a run fails, with the point.
+    """
+
+    def label(point: np.ndarray) -> str:
+        try:
+            return labels.label(point)
+        except SceneError:  # of the settings, not of a point
+            raise
+        except HarnessError as error:
+            place = ", ".join(f"{axis} = {value:.12g}" for axis, value in zip(axes, point, strict=True))
+            raise HarnessError(f"the run with {place} failed: {error}") from None
+
     before, edges = labels.n_runs, list[Edge]()
-    names = [labels.label(point) for point in points]
+    names = [label(point) for point in points]
     if isinstance(labels, MotionLabels) and labels.ends:  # motions that were found later may exist at earlier points
-        names = [labels.label(point) for point in points[::-1]][::-1] if len({*names}) > 1 else names
+        names = [label(point) for point in points[::-1]][::-1] if len({*names}) > 1 else names
     is_final = False
     while not is_final:
         is_final, edges = True, []
         for number, (a, b) in enumerate(pairwise(points)):
-            for low, high, *sides in find_edges(labels.label, a, b, names[number], names[number + 1]):
+            for low, high, *sides in find_edges(label, a, b, names[number], names[number + 1]):
                 edges.append(Edge(tuple((0.5 * (low + high)).tolist()), *sides))
                 for at, end in ((number, low), (number + 1, high)):
                     if (end == points[at]).all():  # motions that were followed up to this point
-                        name, names[at] = names[at], labels.label(end)
+                        name, names[at] = names[at], label(end)
                         is_final &= names[at] == name
     return Line(names, edges, labels.n_runs - before)
 
 
-def search_line(request: MapRequest, fmu: bytes, points: np.ndarray) -> Line:
-    """Search a line in a worker, which may not have the file of the FMU."""
-    local = request._replace(spec=replace(request.spec, fmu=store_fmu(request.spec.fmu.name, fmu)))
-    with BUSY, open_labels(local) as labels:
-        return search_points(labels, points)
-
-
-@cache
-def store_fmu(name: str, content: bytes) -> Path:
-    """Store an FMU until the process ends, and return its path."""
-    file = PROCESS_RESOURCES.enter_context(temporary_directory("map-")) / name
-    file.write_bytes(content)
-    return file
+def search_line(request: MapRequest, points: np.ndarray) -> Line:
+    """Search a line in a worker."""
+    with BUSY, open_labels(request) as labels:
+        return search_points(labels, points, request.names)
 
 
 def grid_lines(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -223,7 +227,6 @@ def compute_map(
     request: MapRequest,
     grid: tuple[np.ndarray, ...],
     workers: int | None,
-    scheduler: str | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> MapResult:
     """Find what motions do over one or two parameters.
@@ -236,8 +239,6 @@ def compute_map(
         Increasing values (n,) of each parameter.
     workers : int or None
         Number of worker processes; None for this process.
-    scheduler : str or None
-        Address of the scheduler of a Dask cluster, whose workers are used.
     report : callable
         Receives the progress from 0 to 1.
 
@@ -253,15 +254,15 @@ def compute_map(
     fmu, lines = native_equivalent(spec.fmu), grid_lines(grid)
     if not request.measure and exposes_solver_steps(read_description(fmu, spec.lenient)):
         fmu = native_with_derivatives(fmu)
-    content, run = fmu.read_bytes(), request._replace(spec=replace(spec, fmu=fmu))
-    with open_workers(scheduler, workers, len(lines)) as pool:
+    run = request._replace(spec=replace(spec, fmu=fmu))
+    with open_workers(workers, len(lines)) as pool:
         futures: dict[Future[Line], int] = {}
         results = dict[int, Line]()
         while len(results) < len(lines):
             check_interrupt()
-            while len(futures) < 2 * max(1, pool.size) and len(results) + len(futures) < len(lines):
+            while len(futures) < 2 * pool.size and len(results) + len(futures) < len(lines):
                 number = len(results) + len(futures)
-                futures[pool.submit(search_line, run, content, lines[number])] = number
+                futures[pool.submit(search_line, run, lines[number])] = number
             for future in pool.wait_for_any(futures):
                 try:
                     results[futures.pop(future)] = future.result()

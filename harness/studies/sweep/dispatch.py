@@ -1,4 +1,4 @@
-"""Distribution of the runs of a sweep to workers, on this machine or of a Dask cluster, with a checkpoint.
+"""Distribution of the runs of a sweep to workers, with a checkpoint.
 
 Results do not depend on the worker or the order of execution. A run that kills its worker is located by bisection.
 
@@ -12,7 +12,7 @@ import logging
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -24,7 +24,7 @@ import numpy as np
 from ...analyses.measured_runs import BlockResult, SweepSpec, run_block, unload
 from ...errors import HarnessError
 from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, check_interrupt
-from ...process.temporary_directory import lock_path
+from ...process.temporary_directory import lock_path, temporary_directory
 from ...process.workers import Workers, open_workers
 from .sampling import SweepPoints
 
@@ -179,7 +179,6 @@ class Sweep:
 def run_pending(
     sweep: Sweep,
     checkpoint: Checkpoint,
-    scheduler: str | None,
     workers: int | None,
     report: Callable[[float], None],
     resume: str,
@@ -193,8 +192,8 @@ def run_pending(
     if not spans:
         return 0.0
     try:
-        with open_workers(scheduler, workers, total - checkpoint.n_done, unload) as pool:
-            for first, values, messages in completed_blocks(sweep, pool, spans):
+        with stored_fmu(sweep) as runs, open_workers(workers, total - checkpoint.n_done) as pool:
+            for first, values, messages in completed_blocks(sweep, runs, pool, spans):
                 checkpoint.add(first, values, messages)
                 LOG.debug("%d of %d runs are finished", checkpoint.n_done, total)
                 report(checkpoint.n_done / total)
@@ -208,38 +207,41 @@ def run_pending(
     return perf_counter() - start
 
 
+@contextmanager
+def stored_fmu(sweep: Sweep) -> Iterator[SweepSpec]:
+    """Store the FMU, whose file may be replaced during the sweep; return the settings of runs of the stored FMU."""
+    with temporary_directory("sweep-") as folder:
+        file = folder / sweep.runs.run.fmu.name
+        file.write_bytes(sweep.fmu)
+        try:
+            yield replace(sweep.runs, run=replace(sweep.runs.run, fmu=file))
+        finally:
+            unload()
+
+
 def completed_blocks(
-    sweep: Sweep, workers: Workers, spans: list[Span]
+    sweep: Sweep, runs: SweepSpec, workers: Workers, spans: list[Span]
 ) -> Iterator[tuple[int, np.ndarray, dict[int, str]]]:
     """Do the runs of all spans in blocks that grow until each takes half a second.
 
-    Every worker has one block in reserve. A block whose worker died is a suspect: it is repeated while nothing else
-    runs, because a cluster also blames blocks that waited for the same worker, and is halved if its worker dies again,
-    down to the run that kills it.
+    Every worker has one block in reserve. A block whose worker died is halved, down to the run that kills it, which is
+    repeated once, because the system may have killed the worker for lack of memory.
 
     Yields
     ------
     first, values, messages : int, numpy.ndarray, dict
         Number of the first run of a finished block, its values (runs, columns), and error messages by index.
     """
-    pending, suspects, running = spans[::-1], list[Span](), dict[Future[BlockResult | None], Span]()
-    size, deaths, is_isolated = 1, 0, False
-
-    def submit(first: int, end: int, fmu: bytes = b"") -> None:
-        points = sweep.points.coordinates(first, end)
-        running[workers.submit(run_block, points, sweep.runs, sweep.digest, fmu)] = first, end
-
-    while pending or suspects or running:
+    pending, repeated, running = spans[::-1], set[int](), dict[Future[BlockResult], Span]()
+    size, deaths = 1, 0
+    while pending or running:
         check_interrupt()
-        if suspects and not running:
-            is_isolated = True
-            submit(*suspects.pop())
-        while pending and not suspects and not is_isolated and len(running) < 2 * max(1, workers.size):
-            share = sum(end - first for first, end in pending) // (SHARES * max(1, workers.size))
+        while pending and len(running) < 2 * workers.size:
+            share = sum(end - first for first, end in pending) // (SHARES * workers.size)
             first, last = pending.pop()
             end = min(last, first + max(1, min(size, share)))
             pending += [(end, last)] if end < last else []
-            submit(first, end)
+            running[workers.submit(run_block, sweep.points.coordinates(first, end), runs)] = first, end
         for future in workers.wait_for_any(running):
             first, end = running.pop(future)
             try:
@@ -248,21 +250,19 @@ def completed_blocks(
                 deaths += 1
                 if deaths > MAX_DEATHS:
                     raise HarnessError(f"workers died {deaths} times") from None
-                if is_isolated and end == first + 1:
+                if end > first + 1:
+                    middle = (first + end) // 2
+                    pending += [(first, middle), (middle, end)]
+                elif first in repeated:
                     yield first, np.full((1, sweep.columns), np.nan), {0: WORKER_DIED}
                 else:
-                    middle = (first + end) // 2
-                    suspects += [(first, middle), (middle, end)] if is_isolated else [(first, end)]
-                is_isolated = False
+                    repeated.add(first)
+                    pending.append((first, end))
             except HarnessError:
                 raise
             except Exception as error:  # such as a missing package or lack of memory
                 raise HarnessError(f"a worker failed: {type(error).__name__}: {error}") from None
             else:
-                if result is None:  # the worker does not have the FMU yet
-                    submit(first, end, sweep.fmu)
-                    continue
-                is_isolated = False
                 elapsed = max(result.seconds, 1e-9)
                 size = max(1, min(MAX_BLOCK_SIZE, 10 * size, round((end - first) / elapsed * BLOCK_TIME)))
                 yield first, result.values, result.messages

@@ -78,7 +78,6 @@ def run_sweep(
     measures: Sequence[str],
     name: str | None,
     out: Path,
-    scheduler: str | None,
     workers: int | None,
     report: Callable[[float], None],
     resume: str,
@@ -104,7 +103,7 @@ def run_sweep(
     # opened before the runs, so that conflicts are reported at once
     with checkpoint.open(), replace_folder(folder, STUDY.files, source) as new_folder:
         n_resumed = checkpoint.n_done
-        seconds = run_pending(sweep, checkpoint, scheduler, workers, report, resume)
+        seconds = run_pending(sweep, checkpoint, workers, report, resume)
         failures = group_failures(sweep, checkpoint.messages)
         if len(checkpoint.messages) == len(points):
             checkpoint.clear()  # all runs are repeated
