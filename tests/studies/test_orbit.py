@@ -1,5 +1,6 @@
 """Periodic motions of built FMUs, against closed forms, a transcendental equation and a solver of scipy."""
 
+import json
 import shutil
 from functools import cache
 from math import atan, pi, sqrt
@@ -333,8 +334,11 @@ def follow_pair(y, v_b, stop):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("section", [None, "x1", "mode1"])
-def test_an_orbit_of_two_blocks_is_found_by_each_section_and_repeats_in_scipy(section):
+def test_an_orbit_of_two_blocks_is_found_by_each_section_and_repeats_in_scipy(section, tmp_path):
     result = harness.orbit(pair(), {"v_b": 0.8}, section=section)
+    result.save(tmp_path / "orbit")
+    origin = json.loads((tmp_path / "orbit" / "provenance.json").read_text())
+    assert origin["scene"] == ({"section": section} if section else {})
     orbit = motion(result, STICK_SLIP)
     assert (orbit.n_sticks, orbit.stability) == (2, "stable")
     assert orbit.period == pytest.approx(3.5388039025118, rel=1e-11)

@@ -65,6 +65,8 @@ class OrbitResult(Result):
         Number of runs of the FMU.
     settings : dict
         Effective values of the parameters.
+    options : dict
+        Values of the parameter that varies, section, and period, if they are set.
     """
 
     study, _function = "orbit", "orbit"
@@ -81,6 +83,7 @@ class OrbitResult(Result):
     remarks: tuple[str, ...]
     n_runs: int
     settings: dict[str, Any]
+    options: dict[str, Any]
 
     @property
     def title(self) -> str:
@@ -149,7 +152,9 @@ class OrbitResult(Result):
 
     def _origin(self) -> dict[str, Any]:
         fmu, parameters = self.spec.fmu, {name: (value, "") for name, value in self.settings.items()}
-        return {"files": [fmu], "parameters": parameters, "source": describe_sources(str(fmu)), "run": self.spec}
+        return {"files": [fmu], "parameters": parameters, "source": describe_sources(str(fmu)), "run": self.spec} | {
+            "scene": self.options
+        }
 
     def _write_tables(self, folder: Path) -> None:
         if self.motions:

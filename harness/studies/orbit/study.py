@@ -295,6 +295,7 @@ def compute_orbits(
         points = join_changes(points)
         every = tuple(motion for found in motions for motion in sorted(found, key=lambda motion: motion.amplitude))
         coordinate = oscillator.states[oscillator.coordinate]
+        options = {"over": {parameter: [*values]} if parameter else None, "section": section, "period": period}
         return OrbitResult(
             spec,
             parameter,
@@ -308,4 +309,5 @@ def compute_orbits(
             tuple(dict.fromkeys(tracer.remarks)),
             oscillator.n_runs,
             {name: oscillator.default(name) for name in oscillator.parameters},
+            {name: value for name, value in options.items() if value},
         )
