@@ -331,59 +331,76 @@ class Oscillator:
         yield from (y for y in (self.start, *moved) if not self.begin(y).sticks)
 
     def find_coordinates(self) -> None:
-        """Find the coordinates that repeat."""
+        """Find the coordinates that repeat, and the values of the parameters that set them at the start."""
         for state, is_speed, row in zip(self.states, self.speeds, self.matrix, strict=True):
             if is_speed and not row.any():
                 raise self.has_no_start(state)
-        n, name, states = len(self.states), self.spec.fmu.name, [*self.sliding_states()]
+        name, states = self.spec.fmu.name, [*self.sliding_states()]
         if not states:
             raise HarnessError(f"{name} has a contact that sticks in all states near its start: choose another start")
         rates = self.begin(states[0]).f
         points = (point for y in states for point in islice(self.follow(y), 0, SAMPLED * 10, 10) if not point.sticks)
         jacobians = np.array([self.read_jacobian() for _ in points])
         is_constant = ~jacobians.any(axis=(0, 2))
-        is_clock = is_constant & (rates != 0.0) & jacobians.any(axis=(0, 1))
-        units = np.array([self.units[state] for state in self.states])
-        if self.period is None and (is_clock & (units == "s")).any():
-            clock = self.states[int(np.argmax(is_clock & (units == "s")))]
-            raise HarnessError(f"{name} has forces that depend on the time {clock}: give their period in s")
-        phases = np.flatnonzero(is_clock & (units == ("rad" if self.period is None else "s")))
-        if self.period is not None and not (len(phases) or self.signals):
-            raise HarnessError(f"{name} has no forces that depend on a time, and no inputs: remove the period")
-        self.phase = int(phases[0]) if len(phases) else None
+        self.phase = self.find_phase(is_constant & (rates != 0.0) & jacobians.any(axis=(0, 1)))
         if self.phase is not None and not self.matrix[self.phase].any():
             self.find_phase_parameter(self.phase, states[0])
         self.sets_phase = self.phase is not None and bool(self.matrix[self.phase].any())
-        kept = np.arange(n) != self.phase
-        self.basis = np.eye(n)[:, kept & (self.speeds > 0.0)]
-        self.basis = np.hstack([self.find_basis(np.concatenate(jacobians), kept & (self.speeds == 0.0)), self.basis])
-        measured = np.flatnonzero(self.basis.any(axis=1) & ~is_constant)
+        basis = self.find_basis(jacobians)
+        measured = np.flatnonzero(basis.any(axis=1) & ~is_constant)
         if not len(measured):
             raise HarnessError(f"{name} has no force that depends on a position or a speed, and so no oscillations")
         self.coordinate = int(measured[0])
-        row = self.basis[self.coordinate]
-        self.gauge = self.basis @ row / (row @ row)
+        row = basis[self.coordinate]
+        self.gauge = basis @ row / (row @ row)
         self.displacement = self.gauge / (self.gauge @ self.gauge)
-        set_by = np.column_stack([self.basis, np.eye(n)[:, phases[: int(self.sets_phase)]]])
-        reduced = set_by.T @ self.matrix
-        self.inverse = np.linalg.pinv(reduced) @ set_by.T  # translations stay as they are at the start
+        self.set_inverse(basis)
         stiffness = np.abs(jacobians[:, self.speeds > 0.0][:, :, self.speeds == 0.0]).max(initial=0.0)
         self.rate = float(np.sqrt(stiffness)) or 1.0
-        scales = np.where(self.basis.T @ self.speeds > 0.0, self.rate, 1.0)
-        self.basis, self.reduction = self.basis * scales, self.basis.T / scales[:, None]
-        for state, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
-            if np.abs(missing).max() > 1e-9:
-                raise self.has_no_start(state)
+        scales = np.where(basis.T @ self.speeds > 0.0, self.rate, 1.0)
+        self.basis, self.reduction = basis * scales, basis.T / scales[:, None]
 
-    def find_basis(self, jacobian: np.ndarray, kept: np.ndarray) -> np.ndarray:
-        """Return the coordinates (n, r) of some of the states, without their translations, which change no rate."""
-        columns = jacobian[:, kept]
+    def find_phase(self, is_clock: np.ndarray) -> int | None:
+        """Return the index of the state that is the phase angle of a force or its clock, of those (n,) that can be."""
+        units = np.array([self.units[state] for state in self.states])
+        clocks, angles = np.flatnonzero(is_clock & (units == "s")), np.flatnonzero(is_clock & (units == "rad"))
+        if self.period is None and len(clocks):
+            clock = self.states[clocks[0]]
+            raise HarnessError(
+                f"{self.spec.fmu.name} has forces that depend on the time {clock}: give their period in s"
+            )
+        if self.period is not None and not (len(clocks) or self.signals):
+            raise HarnessError(
+                f"{self.spec.fmu.name} has no forces that depend on a time, and no inputs: remove the period"
+            )
+        phases = angles if self.period is None else clocks
+        return int(phases[0]) if len(phases) else None
+
+    def find_basis(self, jacobians: np.ndarray) -> np.ndarray:
+        """Return the coordinates (n, r) of the states except the phase, without translations, which change no rate."""
+        unit, kept = np.eye(len(self.states)), np.arange(len(self.states)) != self.phase
+        positions, speeds = unit[:, kept & (self.speeds == 0.0)], unit[:, kept & (self.speeds > 0.0)]
+        columns = np.concatenate(jacobians) @ positions
         scales = np.linalg.norm(columns, axis=0)
         scales[scales == 0.0] = 1.0
         _, sizes, rows = np.linalg.svd(columns / scales)
         rank = int(np.count_nonzero(sizes > 1e-10 * sizes.max(initial=0.0)))
-        rows = np.eye(len(scales)) if rank == len(scales) else np.linalg.qr((rows[:rank] * scales).T)[0].T
-        return np.eye(len(kept))[:, kept] @ rows.T
+        if rank < len(scales):
+            positions = positions @ np.linalg.qr((rows[:rank] * scales).T)[0]
+        return np.hstack([positions, speeds])
+
+    def set_inverse(self, basis: np.ndarray) -> None:
+        """Set the values of the start parameters by the states: those of the basis, and the phase if one sets it.
+
+        Translations stay as they are at the start.
+        """
+        is_phase = (np.arange(len(self.states)) == self.phase) & self.sets_phase
+        set_by = np.column_stack([basis, np.eye(len(self.states))[:, is_phase]])
+        reduced = set_by.T @ self.matrix
+        self.inverse = np.linalg.pinv(reduced) @ set_by.T
+        for state, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
+            if np.abs(missing).max() > 1e-9:
+                raise self.has_no_start(state)
 
     def has_no_start(self, state: str) -> HarnessError:
         """Return the error of a model without a parameter that sets a state."""
