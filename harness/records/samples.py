@@ -211,8 +211,6 @@ def mark_dropouts(values: np.ndarray, name: str) -> list[str]:
 def leave_out_saturated(record: Motion) -> Motion:
     """Return a record without the samples at which the sensor was saturated, and with a note on them."""
     x = record.x
-    if not len(x):
-        return record
     is_saturated, levels, peaks = np.zeros(len(x), bool), [], 0
     for sign in (1.0, -1.0):
         side, count = find_saturated(sign * x)

@@ -136,6 +136,7 @@ CALLS = [
     *((harness.identify_curve, {}, *row) for row in CURVE),
     *((harness.sweep, {"source": "smd", "grid": {"k": [1.0]}}, *row) for row in SWEEP),
     *((harness.fit, {"source": "stickslip", "free": ["mu_s"], "observe": "x"}, *row) for row in FIT),
+    (harness.map_motions, {"over": {"k": [1.0, 2.0]}}, {"source": "nowhere.fmu"}, "there is no nowhere.fmu: specify"),
 ]
 
 

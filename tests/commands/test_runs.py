@@ -57,6 +57,7 @@ def test_the_main_job_runs_every_published_case(main_job):
     assert (done.returncode, done.stderr) == (0, "")
     cases = {path.stem for path in (ROOT / "harness/scenes").glob("*.toml")}
     assert {path.name for path in results.iterdir()} == cases
+    assert re.search(" published *\n.* MATLAB ode23 *\n", done.stdout)  # above the values of a run
     for case in cases:
         assert case in done.stdout
         assert {"trajectory.csv", "steps.csv", "figure.svg"} <= {path.name for path in (results / case).iterdir()}

@@ -37,10 +37,10 @@ class Shoe(Model):
     a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
     stop_time = 4.0
 '''
-STOP = 4.0
+STOP = 2.0
 CASES = {  # amplitude of the force, load that changes its sign: both directions lift off, or only one
-    "no liftoff": (2.0, 0.0),
     "liftoff in both directions": (9.0, 0.0),
+    "no liftoff": (2.0, 0.0),
     "liftoff in one direction": (0.5, 7.5),
     "liftoff at different times": (2.0, 6.0),
 }

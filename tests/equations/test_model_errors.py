@@ -138,6 +138,11 @@ WRONG = {
         17,
         "R is declared in N, but slide k is in kg/s^2",
     ),
+    "a threshold of another unit": (
+        DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD), eps=f") + STUCK,
+        17,
+        "the slip of R is in m/s, but eps f is in kg m/s^2",
+    ),
     "a rule that moves": (RATE + '    rules = Rule(x > 1.0, "far")\n', 17, "a Rule must depend on parameters only"),
     "a rule with another name": (
         RATE + '    rules = Rule(k > 1.0, "{stiff!r} is much")\n',
@@ -170,7 +175,7 @@ WRONG = {
         "start of q must be a number, got '1.0'",
     ),
     "a variable without a name": (
-        RATE.replace("F - k * x", 'Parameter(1.0, "N", "pull") - k * x'),
+        RATE.replace("F - k * x", 'Output("N", "force", Parameter(1.0, "N", "pull") - k * x)'),
         16,
         "a uses a variable without a name: assign the variable to a name in the class first",
     ),
@@ -447,6 +452,7 @@ WRONG = {
         17,
         "Choice takes at most 1 arguments without a name, got 2: write Choice(text, **items)",
     ),
+    "an argument that another function lacks": (RATE + "    q = abs()\n", 17, "TypeError: abs() takes exactly one"),
     "two modes": (
         DRY.replace("mode=mode", "mode=(mode, mode)") + STUCK,
         17,

@@ -168,6 +168,7 @@ def test_a_common_file_format_gives_the_expected_parameters(tmp_path, name):
     for symbol, truth in TRUTH.items():
         assert values[symbol].value == pytest.approx(truth, rel=2e-3)
     assert MESSAGES.get(name, "") in " ".join(record.notes)
+    assert "taken for a title" not in " ".join(record.notes)
 
 
 MM = 1e3 * X + 500  # offset, so that no number begins with 0

@@ -236,6 +236,7 @@ def test_a_record_in_a_comparison_has_no_run():
     assert repr(comparison.two).startswith("<Signals of the record: x; ")
     assert json.loads(Path("kept/provenance.json").read_text())["files"].keys() == {str(run.spec.fmu)}
     np.testing.assert_array_equal(comparison.two.plot("x")[0].lines[0].get_ydata(), run["x"])
+    assert comparison.plot()[-1].get_xlim() == (run.time[0], run.time[-1])
 
 
 def test_a_run_is_a_mapping_from_its_outputs():

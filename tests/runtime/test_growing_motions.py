@@ -15,12 +15,11 @@ from independent_solution import ClosedFormMotion, LinearSegment, System, sticks
 from models import DOP853, EXACT, EXAMPLE_MODELS, ODE23, ODE45, RODAS
 from mpmath import exp, mpf
 from power_series_body import Body, sample_motion
+from variants import slow_after
 from worker_client import FmiError
 
 from fmus.runtime.linear_closed_form import GROWING, LinearClosedForm
 from harness.studies.stability.study import grouped_cases, measure_stability
-
-pytestmark = pytest.mark.slow
 
 ROUNDING = 1e-13  # relative to the largest term of the solution
 DIVERGES = "the solution diverges after t = "
@@ -115,12 +114,12 @@ def largest_terms(start, s):
     )
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", slow_after(1, range(5)))
 @pytest.mark.parametrize("draw_motion", [draw_start, draw_decay])
 def test_the_closed_form_is_right_to_rounding(draw_motion, seed):
     """At short and long times, for all signs, with a force that has a rate and an equilibrium that moves."""
     draw = random.Random(seed)
-    for _ in range(60):
+    for _ in range(24):
         start, rate = draw_motion(draw)
         closed_form, segment = begin(start)
         s = min(power_of_ten(draw, -5, 1.5) / rate, closed_form.max_duration)
@@ -130,6 +129,7 @@ def test_the_closed_form_is_right_to_rounding(draw_motion, seed):
             assert error <= ROUNDING * scale, (start, s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("draw_motion", [draw_start, draw_decay])
 def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
@@ -178,6 +178,7 @@ def test_a_body_at_an_unstable_equilibrium_stays_there():
         assert closed_form.evaluate(1e9) == (x + v * 1e9, v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k", "c"), SIGNS + LIMITS)
 def test_a_body_with_a_contact_agrees_for_every_sign_of_stiffness_and_damping(worker, k, c):
     """Motion and changes of mode by the method exact; a start that only slides, and one that sticks for a while."""
@@ -197,6 +198,7 @@ def test_a_body_with_a_contact_agrees_for_every_sign_of_stiffness_and_damping(wo
         body.free()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_solves_every_sign_of_stiffness_and_damping(worker, method):
     for k, c in SIGNS:
@@ -209,6 +211,7 @@ def test_every_method_solves_every_sign_of_stiffness_and_damping(worker, method)
         body.free()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k", "c"), [(-40.0, -0.2), (40.0, -0.2)])
 def test_an_importer_solves_a_growing_motion_in_model_exchange(k, c):
     result = simulate_fmu(
@@ -223,6 +226,7 @@ def step_to(body, stop):
         body.step(float(n), 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("backend", "method", "stop"),
     [("fmi3", EXACT, 200.0), ("python", EXACT, None), ("native", ODE23, None), ("native", RODAS, 200.0)],
@@ -240,6 +244,7 @@ def test_a_motion_that_grows_without_bound_ends_with_one_sentence(worker, backen
         body.free()
 
 
+@pytest.mark.slow
 def test_a_force_with_derivatives_acts_on_a_growing_motion(worker):
     for k, c in ((k, c) for k, c in SIGNS if k < 0.0 or c < 0.0):
         for force in ((0.3, 2.0), (0.0, -3.0)):
@@ -255,6 +260,7 @@ def test_a_force_with_derivatives_acts_on_a_growing_motion(worker):
             body.free()
 
 
+@pytest.mark.slow
 def test_a_driver_pulls_a_body_by_a_negative_stiffness(worker, tmp_path):
     """The sled of the shipped model; the driver moves its unstable equilibrium."""
     source = (ROOT / "fmus" / "stickslip.py").read_text()
@@ -274,6 +280,7 @@ def test_a_driver_pulls_a_body_by_a_negative_stiffness(worker, tmp_path):
         body.free()
 
 
+@pytest.mark.slow
 def test_references_and_stability_accept_an_unstable_model(tmp_path):
     path = fmu("python").with_suffix(".py")
     file = tmp_path / path.name
