@@ -50,6 +50,7 @@ IDENTIFY_DECAY = [
     ({"record": "nowhere.csv", "x": DECAY[1]}, "x has no effect, because the record has columns"),
     ({"record": "nowhere.csv", "begin": 2.0, "end": 1.0}, "begin = 2.0 s must be before end = 1.0 s"),
     ({"record": {"t": range(20), "x [m]": range(20)}}, "as in t [ms], or as in time='t [ms]'"),
+    ({"record": {"y": SWING, "x [m]": SWING}}, "or set the sampling rate in Hz, as in rate="),
     (
         {"record": {"x [m]": SWING, "y [m]": SWING}},
         "name it, as in time='x [m]', or set the sampling rate in Hz, as in rate=",

@@ -74,8 +74,9 @@ def test_the_main_job_ends_with_one_sentence_on_what_agrees_and_explains_steps_t
 
 def test_the_main_job_names_each_case_that_differs(workspace, monkeypatch):
     """In red, as in a terminal; the exit status is that of the runs."""
-    stop = ROOT / "harness/scenes/coulomb-stop.toml"
-    monkeypatch.setattr("harness.scenes.scene.shipped_scenes", lambda: [stop])
+    (workspace / "scenes").mkdir()
+    shutil.copy(ROOT / "harness/scenes/coulomb-stop.toml", workspace / "scenes")
+    monkeypatch.setattr("harness.scenes.scene.SHIPPED", workspace / "scenes")
     monkeypatch.setattr("harness.studies.run.result.MAX_DEVIATION", -1.0)
     done = harness(workspace, "--out", "results", FORCE_COLOR="1")
     assert done.returncode == 0

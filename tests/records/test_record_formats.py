@@ -270,6 +270,7 @@ def test_numbers_and_times_are_read_in_any_notation(tmp_path, name):
     path.write_bytes(written.encode() if isinstance(written, str) else written)
     record = read_record(path, **options)
     assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
+    assert ("a table in several sheets" in " ".join(record.notes)) == (name == "the longest sheet")
     assert record.x - record.x[0] == pytest.approx(X - X[0], abs=1e-6)
 
 
