@@ -130,7 +130,7 @@ def test_the_smooth_sled_creates_no_energy():
 def case(user_folder):
     """A case of the table, which finishes: the mass at rest with dry friction, without input."""
     with chdir(user_folder):
-        cases = grouped_cases(lambda scene: scene["title"] == "f just below k x0: it moves by some bits")
+        cases = grouped_cases(lambda scene: scene["title"].startswith("f = 15.9"))  # has one error for all methods
     (case,) = (case for group in cases for case in group if case.method == "exact" and case.model == "coulomb")
     run = replace(case.run, fmu=user_folder / case.run.fmu)
     return replace(case, run=run, max_error=1e-3, grid=CommunicationGrid(0.0, 1.0, 2), events="all")
