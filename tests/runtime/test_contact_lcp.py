@@ -122,9 +122,12 @@ def test_a_contact_with_more_sliding_than_static_friction_is_reported():
     assert chain.answer() == ((0,), False)
 
 
-@pytest.mark.parametrize(("n", "jump"), [(n, jump) for n in (2, 3, 4) for jump in (1.3, 2.0)])
-def test_as_many_contacts_are_held_as_can_be(n, jump):
-    """Of all consistent modes, those that hold the most; also where releasing the highest loads lets more go."""
+@pytest.mark.parametrize(("n", "jump"), slow_after(3, product((2, 3, 4), (1.3, 2.0))))
+def test_as_many_contacts_are_held_as_can_be(monkeypatch, n, jump):
+    """Of all consistent modes, those that hold the most; also where releasing the highest loads lets more go.
+
+    So it is where pivots do not end at consistent modes.
+    """
     draw, n_choices = np.random.default_rng([n, round(10 * jump)]), 0
     for _ in range(60 if n < 4 else 30):
         chain = Chain(draw, n, jump, True)
@@ -132,6 +135,10 @@ def test_as_many_contacts_are_held_as_can_be(n, jump):
         modes, fits = chain.answer()
         assert fits
         assert modes.count(STUCK) == max(held)
+        with monkeypatch.context() as patch:
+            patch.setattr(contact_lcp, "MAX_ITERATIONS", 0)
+            modes, fits = chain.answer()
+        assert (modes.count(STUCK), fits) == (max(held), True)
         n_choices += min(held) < max(held)
     assert n_choices > 3
 
