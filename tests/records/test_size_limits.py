@@ -78,9 +78,20 @@ def test_a_compressed_data_set_has_a_limit(tmp_path, write):
         read_record(tmp_path / "record")
 
 
-def test_the_limit_is_that_of_the_whole_file(monkeypatch):
+def swap_bytes(data):
+    """Return a .mat file whose numbers outside compressed elements have the other order of bytes."""
+    swapped, position = bytearray(data), 128
+    swapped[124:128] = data[125:123:-1] + data[127:125:-1]  # version and mark of the order
+    while position < len(data):
+        swapped[position : position + 8] = struct.pack(">II", *struct.unpack_from("<II", data, position))
+        position += 8 + struct.unpack_from("<I", data, position + 4)[0]
+    return bytes(swapped)
+
+
+@pytest.mark.parametrize("change", [bytes, swap_bytes])
+def test_the_limit_is_that_of_the_whole_file(monkeypatch, change):
     """Each of the two compressed elements is below the limit."""
-    data = compressed_mat()
+    data = change(compressed_mat())
     monkeypatch.setattr(size_limits, "MAX_UNPACKED", 800_000)
     with pytest.raises(SceneError):
         size_limits.check_mat(data, "record.mat")
