@@ -48,7 +48,7 @@ def map_motions(
 
     Of one body that slides steadily, the regions say whether steady sliding is stable and whether stick-slip goes on;
     of any other model, what motions from its start and from those beside it end in.  Of a model, its native FMU is
-    run; any other FMU needs a section or a measure.
+    run; any other FMU needs a section or a measure.  Exit status 1 if a run fails.
 
     \b
     Examples:
@@ -72,7 +72,8 @@ def map_motions(
         compute = partial(compute, levels=None if levels is None else split_numbers(levels))
         folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])
         result = save_result(folder, compute, "map", describe_sources(source))
-    terminal.print_result(result.as_json(), *result.blocks(), folder=folder)
+    failed = [f"{len(result.failures)} of {result.n_runs} runs failed"] * bool(result.failures)
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder, failed=failed)
 
 
 def split_numbers(text: str) -> list[float]:

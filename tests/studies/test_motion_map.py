@@ -71,8 +71,6 @@ def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
     ):
         with pytest.raises(harness.SceneError, match=message):
             harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.7]}, **options)
-    with pytest.raises(harness.HarnessError, match=r"the run with mu_d = 0\.95 failed: mu_d is 0\.95, above"):
-        harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.5, 0.95]}, measure="slips", workers=1)
     with pytest.raises(harness.SceneError, match="is not a whole number: give the levels"):
         harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.7]}, measure="peak_speed")
     levels = harness.map_motions(
@@ -83,6 +81,19 @@ def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
         assert speed + sqrt((frequency * (mu_s - edge.point[0]) * m * g / k) ** 2 + speed**2) == pytest.approx(
             level, rel=1e-4
         )
+
+
+def test_points_at_which_runs_fail_are_a_region(in_workspace):
+    result = harness.map_motions(native("coulomb"), {"f": [-0.25, 0.25, 0.5]}, measure="events", levels=[-1.0])
+    assert result.labels == ("run failed", "-1 <= events", "-1 <= events")
+    assert result.edges[0].point[0] == pytest.approx(0.0, abs=1e-15)  # the smallest friction force
+    assert "of these runs failed, such as f = -0.25: f = -0.25 N is refused" in " ".join(str(result).split())
+    words = ("--over", "f=-0.25:0.5:4", "--measure", "events", "--workers", "1")
+    done = commands.harness(in_workspace, "map", "coulomb", *words)
+    assert done.returncode == 1
+    assert re.fullmatch(r"Error: \d+ of \d+ runs failed\n", done.stderr)
+    with pytest.raises(harness.HarnessError, match=r"^all runs of the map failed, such as f = -2: f = -2\.0 N is ref"):
+        harness.map_motions(native("coulomb"), {"f": [-2.0, -1.5, -1.0]}, measure="events", workers=1)
 
 
 @pytest.mark.slow

@@ -62,6 +62,8 @@ class MapResult(Result):
         Edges along the lines of the grid.
     n_runs : int
         Number of runs of the FMU.
+    failures : tuple of str
+        Points of the runs that failed, with their messages.
     settings : dict
         Values of the other parameters.
     options : dict
@@ -76,6 +78,7 @@ class MapResult(Result):
     labels: tuple[str, ...]
     edges: tuple[Edge, ...]
     n_runs: int
+    failures: tuple[str, ...]
     settings: dict[str, Any]
     options: dict[str, Any]
 
@@ -129,6 +132,7 @@ class MapResult(Result):
             f"Points of the grid: {counts}.",
             *[f"{more} more edges."] * (more > 0),
             f"{self.n_runs} runs of the FMU.",
+            *(f"{len(self.failures)} of these runs failed, such as {failure}" for failure in self.failures[:1]),
         ]
 
     def as_json(self) -> dict[str, Any]:
@@ -137,6 +141,7 @@ class MapResult(Result):
             "axes": {name: axis.tolist() for name, axis in zip(self.units, self.axes, strict=True)},
             "labels": list(self.labels),
             "edges": self._rows(self.edges),
+            "failures": list(self.failures),
         }
 
     def _origin(self) -> dict[str, Any]:

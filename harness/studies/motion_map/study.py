@@ -25,17 +25,19 @@ from ...simulation.poincare import CYCLE, IRREGULAR, TURNING, NoOrbitError, Retu
 from ...simulation.saved_states import SavedStateMotion
 from .result import Edge, MapResult
 
+FAILED = "run failed"
 BOTH, NEITHER = f"{STEADY} or {STICK_SLIP}", "neither"
 
 BUSY = Lock()  # messages of FMUs are captured by one thread at a time
 
 
 class Line(NamedTuple):
-    """Labels (n,) of the points of a line, the edges between them, and the number of runs."""
+    """Labels (n,) of the points of a line, the edges between them, the number of runs, and messages of failed ones."""
 
     labels: list[str]
     edges: list[Edge]
     n_runs: int
+    failures: list[str]
 
 
 class MapRequest(NamedTuple):
@@ -175,11 +177,9 @@ def open_labels(request: MapRequest) -> Iterator[Labels]:
 def search_points(labels: Labels, points: np.ndarray, axes: tuple[str, ...]) -> Line:
     """Label the points (n, axes) of a line, of which one coordinate varies, and bisect between different ones.
 
-    Raises
-    ------
-    HarnessError
-        If a run fails, with the point.
+    Points at which a run fails are a region like any other.
     """
+    failures = dict[tuple[float, ...], str]()
 
     def label(point: np.ndarray) -> str:
         try:
@@ -188,7 +188,8 @@ def search_points(labels: Labels, points: np.ndarray, axes: tuple[str, ...]) -> 
             raise
         except HarnessError as error:
             place = ", ".join(f"{axis} = {value:.12g}" for axis, value in zip(axes, point, strict=True))
-            raise HarnessError(f"the run with {place} failed: {error}") from None
+            failures[*point.tolist()] = f"{place}: {error}"
+            return FAILED
 
     before, edges = labels.n_runs, list[Edge]()
     names = [label(point) for point in points]
@@ -204,7 +205,7 @@ def search_points(labels: Labels, points: np.ndarray, axes: tuple[str, ...]) -> 
                     if (end == points[at]).all():  # motions that were followed up to this point
                         name, names[at] = names[at], label(end)
                         is_final &= names[at] == name
-    return Line(names, edges, labels.n_runs - before)
+    return Line(names, edges, labels.n_runs - before, [*failures.values()])
 
 
 def search_line(request: MapRequest, points: np.ndarray) -> Line:
@@ -247,7 +248,7 @@ def compute_map(
     SceneError
         If a name or a value is not valid.
     HarnessError
-        If the FMU is not suitable, or a worker dies.
+        If the FMU is not suitable, all runs fail, or a worker dies.
     """
     spec, names = request.spec, request.names
     check_built(spec.fmu, SceneError)
@@ -278,4 +279,7 @@ def compute_map(
     units = {name: parameters[name][1] for name in names}
     options = {name: value for name in MapRequest._fields[2:] if (value := getattr(request, name))}
     n_runs = sum(line.n_runs for line in ordered)
-    return MapResult(spec, units, grid, labels, edges, n_runs, settings, options)
+    failures = tuple(failure for line in ordered for failure in line.failures)
+    if {*labels} == {FAILED}:
+        raise HarnessError(f"all runs of the map failed, such as {failures[0]}")
+    return MapResult(spec, units, grid, labels, edges, n_runs, failures, settings, options)
