@@ -69,6 +69,14 @@ def test_an_undecidable_law_is_reported_with_what_would_decide_it():
     assert "less noise" in remarks_text(fit)
 
 
+@pytest.mark.slow
+def test_a_loss_with_little_effect_on_the_motion_is_reported():
+    small, large = (identify(decay_record(0.01, r, noise=2e-5, t=np.linspace(0, 8, 1500))) for r in (1e-5, 1e-4))
+    assert small["r"].low > 0
+    assert "differs from viscous damping (0.0" in remarks_text(small)
+    assert "differs from" not in remarks_text(large)
+
+
 @pytest.mark.parametrize(("k", "m"), [(157.9, None), (None, 2.0)])
 def test_stiffness_or_mass_convert_the_fit_to_physical_parameters(k, m):
     fit = values(identify(decay_record(0.02, 0.003, 0.4, noise=1e-4), k=k, mass=m).estimates)

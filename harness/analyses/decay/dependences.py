@@ -57,13 +57,11 @@ def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Depe
     if "r" in terms and len(problem.half_cycles(p)[0]) >= thresholds.MIN_SPEED_HALF_CYCLES:
         effects["speed"] = speed_effects(problem, p, terms, jacobian)
     unknowns = problem.unknowns(terms)
-    free = orthonormal(jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)])
     sizes: dict[str, float] = {}
     variances, columns = np.zeros(len(inverse)), jacobian
+    basis = orthonormal(jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)])  # a loss at its bound hides no first cause
     while effects:
-        basis, found = orthonormal(columns), {}
-        for name, effect in effects.items():  # a loss at its bound hides no rise, which a negative loss would follow
-            found[name] = effect_variance(effect, e, free if name == "speed" else basis, width)
+        found = {name: effect_variance(effect, e, basis, width) for name, effect in effects.items()}
         name, (variance, gain) = max(found.items(), key=lambda item: item[1][1])
         if gain < thresholds.PROVEN:
             break
@@ -71,6 +69,7 @@ def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Depe
         effects.pop("speed", None)  # it follows what any other cause leaves, so that it counts as the first one only
         variances += variance * ((inverse @ (jacobian.T @ effect)) ** 2).sum(axis=1)
         columns = np.column_stack([columns, effect])
+        basis = orthonormal(columns)
         sizes[name] = float(np.sqrt(variance * np.mean((effect**2).sum(axis=1))))
     return Dependences(sizes, variances)
 

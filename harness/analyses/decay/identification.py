@@ -37,14 +37,7 @@ from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, OMEGA, REST, TERMS, EnergyLoss, Terms, loss_fractions
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import ambiguity_remark, check_fit, is_unreliable, make_remarks
-from .samples import (
-    Extrema,
-    block_size,
-    estimate_noise,
-    find_extrema,
-    remove_spikes,
-    thin,
-)
+from .samples import Extrema, block_size, estimate_noise, find_extrema, remove_spikes, thin
 from .window import select_decay
 
 
@@ -253,15 +246,5 @@ def identify_record(
     by_extrema, no_extrema = estimate_from_extrema(record, problem, extrema, laws[0], parameters, omega)
     by_two_peaks, no_peaks = estimate_from_two_peaks(record, problem, extrema, laws[0], parameters, omega)
     unavailable = {"turning points": no_extrema, "two peaks": no_peaks}
-    return DecayIdentification(
-        record,
-        extrema,
-        problem,
-        laws,
-        uncertainty,
-        estimates,
-        by_extrema,
-        by_two_peaks,
-        unavailable,
-        tuple(remarks),
-    )
+    results = (problem, laws, uncertainty, estimates, by_extrema, by_two_peaks, unavailable, tuple(remarks))
+    return DecayIdentification(record, extrema, *results)

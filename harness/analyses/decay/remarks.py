@@ -128,23 +128,29 @@ def rounding_remark(problem: DecayProblem, full: FittedLaw, unit: str) -> tuple[
 
 
 def ambiguity_remark(problem: DecayProblem, laws: tuple[FittedLaw, ...]) -> tuple[str, ...]:
-    """Return a remark on the laws that this record cannot distinguish from the best one, and on a record that would."""
+    """Return remarks on the laws that noise, or a small part of the motion, does not distinguish from the best one."""
     best, n = laws[0], len(problem.t)
-    differences = [deviance_difference(problem, law, best) for law in laws]
-    rivals = [
-        (law, difference)
-        for law, difference in zip(laws[1:], differences[1:], strict=True)
-        if (
-            difference < -thresholds.SIGNIFICANT_DEVIANCE
-            if set(best.terms) < set(law.terms)
-            else difference > 0 and law.bic - best.bic < thresholds.CLEAR_BIC
+    rivals, similar = [], []
+    for law in laws[1:]:
+        difference, is_larger = deviance_difference(problem, law, best), set(best.terms) < set(law.terms)
+        excess = law.sum_of_squares - best.sum_of_squares
+        size = np.sqrt(max(excess, 0.0) / n) / problem.signal_rms
+        is_close = difference > 0 and law.bic - best.bic < thresholds.CLEAR_BIC
+        if difference < -thresholds.SIGNIFICANT_DEVIANCE if is_larger else is_close:
+            rivals.append((f"{law.description} ({law.bic - best.bic:+.1f})", difference))
+        elif not is_larger and 0 < excess < best.sum_of_squares and size < thresholds.SIMILAR:
+            similar.append(f"{law.description} ({100 * size:.1g} %)")
+    remarks = []
+    if rivals:
+        factor = float(np.sqrt((thresholds.CLEAR_BIC + np.log(n)) / max(abs(rivals[0][1]), 1.0)))
+        names = " and ".join(name for name, _ in rivals)
+        remarks.append(
+            f"{names[0].upper()}{names[1:]} cannot be distinguished from {best.description} at this noise: that takes "
+            f"{factor:.1f} times less noise, {np.ceil(factor**2):.0f} times as many samples, or more and larger cycles."
         )
-    ]
-    if not rivals:
-        return ()
-    factor = float(np.sqrt((thresholds.CLEAR_BIC + np.log(n)) / max(abs(rivals[0][1]), 1.0)))
-    names = " and ".join(f"{law.description} ({law.bic - best.bic:+.1f})" for law, _ in rivals)
-    return (
-        f"{names[0].upper()}{names[1:]} cannot be distinguished from {best.description} at this noise: that takes "
-        f"{factor:.1f} times less noise, {np.ceil(factor**2):.0f} times as many samples, or more and larger cycles.",
-    )
+    if similar:
+        remarks.append(
+            f"The best law differs from {' and from '.join(similar)} by less than {100 * thresholds.SIMILAR:g} % of "
+            "the motion: a sensor or a loss that departs from its law by as much makes one look like the other."
+        )
+    return tuple(remarks)

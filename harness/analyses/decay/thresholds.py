@@ -109,7 +109,7 @@ INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well b
 # --- Test of the residuals (dependences.py) ---
 WALK_PIECES = 8  # of the random walk of phase, amplitude and rest position over a record
 SEEN = 1e-9  # of the largest eigenvalue, or singular value: smaller parts are those that the fitted values follow
-PROVEN = 4.0  # of the logarithm of the likelihood: white noise exceeds it in one record of 400
+PROVEN = 3.0  # of the logarithm of the likelihood, odds of 20 to 1: white noise exceeds it in one record of 140
 RISE_SPEEDS = (0.05, 0.1, 0.2, 0.4)  # of the first peak speed: the rise of friction falls to 1/e there
 MIN_SPEED_HALF_CYCLES = 8  # with fewer, the laws with three losses follow every rise
 MIN_SENSITIVITY = 1e-3  # of an amplitude to the first one
@@ -122,6 +122,7 @@ UNRELIABLE = 0.05  # fraction of the motion: with larger residuals that are no n
 NOISELESS = 3e-4  # of the amplitude: records with less noise are often simulated
 EXACT = 1e-9  # of the amplitude: smaller residuals are those of the model, and need no remark
 CLEAR_BIC = 6.0  # difference of BIC: odds of 20 to 1
+SIMILAR = 1e-3  # of the motion, between two laws: few sensors are as linear
 SIGNIFICANT_DEVIANCE = 4.0  # of n ln(squares): an unnecessary term exceeds it in one record of twenty
 SIGNIFICANT_GAIN = 5.0  # standard errors of the losses from the nearest ones that are not negative
 MIN_ROUNDED = 6  # turning points for a test of their positions between quantiser steps
