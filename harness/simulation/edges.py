@@ -19,7 +19,8 @@ def find_edges(
     """Return the edges between numbers or points a and b with labels one and two, as neighbours with their labels.
 
     Where a third label is between theirs, there are several edges, unless they are closer than RESOLVED. Of the many
-    windows of chaotic motions, not all are found: an interval is split at most `splits` times.
+    windows of chaotic motions, not all are found: an interval is split at most `splits` times. Then the second label of
+    an edge is not the first one of the next edge, or not that of b.
     """
     if one == two:
         return []
@@ -31,8 +32,10 @@ def find_edges(
         found = label(middle)
         if found == one:
             a = middle
-        elif found == two or not splits or np.abs(b - a).max() <= RESOLVED * np.abs(b).max():
+        elif found == two or np.abs(b - a).max() <= RESOLVED * np.abs(b).max():
             b = middle
+        elif not splits:
+            b, two = middle, found
         else:
             splits -= 1
             return find_edges(label, a, middle, one, found, splits) + find_edges(label, middle, b, found, two, splits)

@@ -64,6 +64,13 @@ def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
     for edge, number in zip(result.edges, (3, 4, 5), strict=True):
         exact = brentq(lambda mu_d, n=number: start_of_slip(mu_d, n) - stop, 0.3, 0.8, xtol=1e-15)
         assert edge.point[0] == pytest.approx(exact, rel=1e-11)
+    assert "more edges than were located" not in str(result)
+    coarse = harness.map_motions(native("stickslip"), {"mu_d": [0.3, 0.87, 0.88]}, measure="slips")
+    assert (coarse.n_gaps > 0, "more edges than were located" in " ".join(str(coarse).split())) == (True, True)
+    for edge in coarse.edges:  # not all, but each is between neighbours
+        below, number = (int(label.split()[1]) for label in (edge.below, edge.above))
+        assert number == below + 1
+        assert start_of_slip(edge.point[0], number) == pytest.approx(stop, rel=1e-10)
     for options, message in (
         ({"levels": [1.0]}, "`levels` has no effect without `measure`"),
         ({"measure": "slips", "section": "v"}, "`section` has no effect with `measure`"),

@@ -60,6 +60,8 @@ class MapResult(Result):
         What motions end in at each point of the grid; the first parameter varies fastest.
     edges : tuple of Edge
         Edges along the lines of the grid.
+    n_gaps : int
+        Number of edges after which another region follows than the next edge, or the end of the line, has.
     n_runs : int
         Number of runs of the FMU.
     failures : tuple of str
@@ -77,6 +79,7 @@ class MapResult(Result):
     axes: tuple[np.ndarray, ...]
     labels: tuple[str, ...]
     edges: tuple[Edge, ...]
+    n_gaps: int
     n_runs: int
     failures: tuple[str, ...]
     settings: dict[str, Any]
@@ -131,6 +134,8 @@ class MapResult(Result):
         return [
             f"Points of the grid: {counts}.",
             *[f"{more} more edges."] * (more > 0),
+            *["Between two points of the grid there are more edges than were located: use more values."]
+            * bool(self.n_gaps),
             f"{self.n_runs} runs of the FMU.",
             *(f"{len(self.failures)} of these runs failed, such as {failure}" for failure in self.failures[:1]),
         ]
@@ -141,6 +146,7 @@ class MapResult(Result):
             "axes": {name: axis.tolist() for name, axis in zip(self.units, self.axes, strict=True)},
             "labels": list(self.labels),
             "edges": self._rows(self.edges),
+            "gaps": self.n_gaps,
             "failures": list(self.failures),
         }
 

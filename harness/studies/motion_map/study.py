@@ -5,6 +5,7 @@ from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import pairwise
+from operator import ne
 from threading import Lock
 from typing import NamedTuple, Protocol
 
@@ -32,12 +33,16 @@ BUSY = Lock()  # messages of FMUs are captured by one thread at a time
 
 
 class Line(NamedTuple):
-    """Labels (n,) of the points of a line, the edges between them, the number of runs, and messages of failed ones."""
+    """Labels (n,) of the points of a line, the edges between them, the number of runs, and messages of failed ones.
+
+    `n_gaps` counts the edges after which another label follows than that of the next edge or of the end.
+    """
 
     labels: list[str]
     edges: list[Edge]
     n_runs: int
     failures: list[str]
+    n_gaps: int
 
 
 class MapRequest(NamedTuple):
@@ -205,7 +210,9 @@ def search_points(labels: Labels, points: np.ndarray, axes: tuple[str, ...]) -> 
                     if (end == points[at]).all():  # motions that were followed up to this point
                         name, names[at] = names[at], label(end)
                         is_final &= names[at] == name
-    return Line(names, edges, labels.n_runs - before, [*failures.values()])
+    below, above = [edge.below for edge in edges], [edge.above for edge in edges]
+    n_gaps = sum(map(ne, [names[0], *above], [*below, names[-1]]))
+    return Line(names, edges, labels.n_runs - before, [*failures.values()], n_gaps)
 
 
 def search_line(request: MapRequest, points: np.ndarray) -> Line:
@@ -282,4 +289,5 @@ def compute_map(
     failures = tuple(failure for line in ordered for failure in line.failures)
     if {*labels} == {FAILED}:
         raise HarnessError(f"all runs of the map failed, such as {failures[0]}")
-    return MapResult(spec, units, grid, labels, edges, n_runs, failures, settings, options)
+    n_gaps = sum(line.n_gaps for line in ordered)
+    return MapResult(spec, units, grid, labels, edges, n_gaps, n_runs, failures, settings, options)
