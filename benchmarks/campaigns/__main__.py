@@ -15,10 +15,10 @@ CAMPAIGNS = {  # name -> command, after the path of Python
     "planar_contacts": ("-m", "benchmarks.campaigns.planar_contacts", "--scenes", "1000", "--driven", "200"),
     "fit_campaign": ("-m", "benchmarks.campaigns.fit_campaign", "--seed", "58", "--records", "200"),
     "interval_coverage": ("-m", "benchmarks.campaigns.interval_coverage", "100"),
-    "decay_defects": ("-m", "benchmarks.campaigns.decay_defects", "60", "4813"),
+    "decay_defects": ("-m", "benchmarks.campaigns.decay_defects", "200", "4813"),
     "low_speed_friction": ("-m", "benchmarks.campaigns.low_speed_friction", "4"),
     "curve_coverage": ("-m", "benchmarks.campaigns.curve_coverage", "900"),
-    "hidden_defects": ("-m", "benchmarks.campaigns.hidden_defects", "60"),
+    "hidden_defects": ("-m", "benchmarks.campaigns.hidden_defects", "200"),
     "orbit_campaign": ("-m", "benchmarks.campaigns.orbit_campaign", "200", "64"),
     "decay_times": ("-m", "benchmarks.campaigns.decay_times"),
 }
