@@ -32,11 +32,12 @@ def assert_covers(curve, margin=1.0, **truth):
         assert low <= value <= high, (name, value, estimate, curve.remarks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "changes", "remark"),
     [
         ({"F_c": 0.2}, {"F_c": 6.6}, "F_c drifts by +1.2 N over the record"),
-        pytest.param({"F_v": -0.3}, {"F_v": 17.0}, "F_v drifts", marks=pytest.mark.slow),
+        ({"F_v": -0.3}, {"F_v": 17.0}, "F_v drifts"),
     ],
     ids=["Coulomb", "viscous"],
 )
@@ -111,6 +112,7 @@ def test_intervals_contain_what_the_steps_of_a_code_without_zero_hide(seed):
     assert all(item.low <= truth[item.name][0] <= item.high for item in curve.estimates)
 
 
+@pytest.mark.slow
 def test_pauses_do_not_replace_the_samples_that_move():
     v = np.concatenate(
         [np.concatenate([np.zeros(200), 0.5 * np.sin(np.pi * np.arange(120) / 120) * s]) for s in [1, -1] * 6]

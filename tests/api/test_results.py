@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import harness as harness_command
 from external_fmus import build_external_fmus
 from native_fmus import build_native_fmus
 from variants import slow_after
@@ -166,20 +165,6 @@ def test_a_sweep_takes_enumerations_by_label(in_workspace):
     assert "1 = hybrid, 3 = threshold" in sweep["friction"].attrs["long_name"]
     with pytest.raises(harness.SceneError, match=r"unknown label of friction 'hybird' \(nearest: 'hybrid'\)"):
         harness.sweep("stickslip", {"friction": ["hybird"]})
-    options = (
-        "--vary",
-        "friction=hybrid,threshold",
-        "--set",
-        "solver.method=ode23",
-        "--measures",
-        "final",
-        "--stop",
-        "2",
-    )
-    done = harness_command(in_workspace, "sweep", "stickslip", *options, "--name", "laws", "--workers", "1")
-    assert (done.returncode, done.stderr) == (0, "")
-    stored = harness.load_result("results/sweep/laws")
-    assert stored["final_x"].values.tolist() == sweep["final_x"].values.tolist()
 
 
 @pytest.mark.slow

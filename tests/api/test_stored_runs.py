@@ -86,7 +86,7 @@ def test_input_signals_of_a_scene_are_those_of_python():
     assert np.abs(scene["x"]).max() > 0.01
 
 
-@pytest.mark.parametrize("source", ["run", "stored run", "trajectory.csv"])
+@pytest.mark.parametrize("source", slow_after(1, ["run", "stored run", "trajectory.csv"]))
 def test_a_fit_fixes_the_values_of_its_run(source):
     """Those that the FMU has otherwise would shift all others without a word."""
     fmu = native_fmus.build_native_fmus() / "coulomb.fmu"

@@ -44,6 +44,7 @@ def test_the_reference_end_of_the_block_agrees_with_two_methods():
         assert answer.states[-1] == pytest.approx(study.BLOCK_ON_BELT, abs=2e-11)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas"])
 def test_every_method_of_the_runtime_reaches_the_end_of_the_block(rows, method):
     assert method in method_numbers(load_more_model("belt"))

@@ -153,7 +153,7 @@ def run_case(case):
     ("how", "reason"),
     [
         ("dies", "it ended with exit status -9: noise of an engine"),
-        pytest.param("hangs", "no answer after 8 s", marks=pytest.mark.slow),
+        pytest.param("hangs", "no answer after 8 s", marks=pytest.mark.campaign),
     ],
 )
 def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(make_module, monkeypatch, how, reason):

@@ -299,6 +299,7 @@ def test_an_unwritable_standard_output_is_no_crash(workspace, command, shell, st
     assert (done.returncode, done.stderr) == (status, message)
 
 
+@pytest.mark.slow
 def test_a_closed_standard_input_is_empty(user_folder, tmp_path):
     done = python(user_folder, "decay", "-", "--out", tmp_path, shell="<&-")
     assert (done.returncode, done.stderr) == (2, "Error: standard input is empty\n")

@@ -94,7 +94,7 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     (["sweep", "stickslip", "--vary", "m=1,2", "--measures", "zeta"], 2, "unknown measure of stickslip 'zeta'"),
     (["sweep", "stickslip", "--vary", "friction=1.5,2"], 2, "friction is an enumeration"),
     (
-        ["sweep", "stickslip", "--vary", "mu_d=1:2:3"],
+        ["sweep", "stickslip", "--vary", "mu_d=1:2:3", "--workers", "1"],
         1,
         "all runs of the sweep failed: 3 runs, such as mu_d = 1.0: mu_d is 1.0, above",
     ),

@@ -293,7 +293,7 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
 @pytest.mark.parametrize(
     "arguments",
     slow_after(
-        3,
+        2,
         [
             ["info"],
             ["run", "nosuch"],
@@ -318,6 +318,7 @@ def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
 
 
+@pytest.mark.slow
 def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
     """Scenes that use more and more modules, one after the other in one process."""
     optional = ["harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps", "matplotlib"]
@@ -360,7 +361,9 @@ def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
 
 
 @pytest.mark.parametrize("words", [["--set", "m=1.5,c=0,solver.method=exact"], ["--set", "m=1.5", "--set", "c=0"]])
-@pytest.mark.parametrize("command", [("run",), ("sweep", "--vary", "x0=0.1,0.2", "--workers", "1")])
+@pytest.mark.parametrize(
+    "command", slow_after(1, [(("run",),), (("sweep", "--vary", "x0=0.1,0.2", "--workers", "1"),)])
+)
 def test_several_assignments_stand_in_one_option(workspace, command, words):
     done = commands.harness(workspace, *command, "fmus/smd.fmu", *words, "--stop", "0.5", "--out", "out")
     assert (done.returncode, done.stderr) == (0, "")
@@ -416,6 +419,7 @@ def test_a_scene_that_runs_too_short_for_an_analysis_names_it(workspace):
     assert load_result(workspace / "results" / "stickslip").time[-1] == 5.0
 
 
+@pytest.mark.slow
 def test_the_first_slip_without_modes_is_named_as_what_is_measured(workspace):
     """A sled that creeps breaks away at no time; it becomes as fast as the driver later than a stick ends."""
     texts = [harness(workspace, "run", name, "--stop", 9).stdout for name in ("stickslip", "pacejka-0.001")]

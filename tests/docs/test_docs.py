@@ -247,6 +247,7 @@ def errors_of_rest(t, x, y):
     return abs(t - rest), np.hypot(x - certified[1], y - certified[2])
 
 
+@pytest.mark.slow
 def test_the_errors_of_friction_in_a_plane_on_the_page_are_those_of_runs():
     require_compiler()
     fmu = build_once("puck-native", "puck", "--native", "--platform", "linux64") / "puck.fmu"

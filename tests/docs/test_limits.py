@@ -65,6 +65,7 @@ def build_model(tmp_path):
     return build_model
 
 
+@pytest.mark.slow
 def test_jenkins_elements_agree_with_a_solution_by_events(build_model):
     times = np.linspace(0.0, STOP, 41)
     run = harness.simulate(build_model("iwan"), times=times, rtol=1e-10)

@@ -237,7 +237,7 @@ def test_a_jump_of_the_force_costs_few_steps(launch):
     assert steps[1] < steps[0] + 2 * piecewise_solution("jump")[1]
 
 
-@pytest.mark.parametrize("name", ["jump", "relay", "backlash"])
+@pytest.mark.parametrize("name", slow_after(2, ["jump", "relay", "backlash"]))
 def test_a_change_costs_at_most_fifty_evaluations_and_no_accuracy(launch, name):
     """As the page on own models says, against the mass on its spring without a condition."""
     evaluations = []
@@ -365,13 +365,19 @@ NEGATIVE = "F_f: the sliding force becomes negative at t = {} s ({} N); if the c
 
 @EVERY_KIND
 def test_a_sliding_force_that_becomes_negative_ends_the_run(launch, kind):
-    """By an input, by the position and by the time; the message names contact, time and value."""
+    """The message names contact, time and value."""
     fmu = launch("slidinginput", kind)
     fmu.step(0.0, 1.0)
     fmu.set({"N_ext": -1.0})
     with pytest.raises(FmiError):
         fmu.step(1.0, 1.0)
     assert fmu.messages()[-1][2].startswith(NEGATIVE.format(1.0, -0.5))
+
+
+@pytest.mark.slow
+@EVERY_KIND
+def test_a_sliding_force_that_becomes_negative_by_the_motion_ends_the_run(launch, kind):
+    """By the position and by the time."""
     assert failure(launch("slidingposition", kind, x0=-0.2)).startswith(NEGATIVE.format(0.0, -5.0))
     message = failure(launch("slidingangle", kind, rtol=1e-9))
     assert message.startswith("F_f: the sliding force becomes negative at t = ")

@@ -16,6 +16,7 @@ from native_fmus import require_compiler
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
+from variants import slow_after
 from worker_client import FmiError
 
 import harness
@@ -372,7 +373,7 @@ def test_derivatives_by_values_of_a_table_are_exact(tunable_fmus, tmp_path):
         assert derivative == pytest.approx(3.0 * expected[1] + 6.0 * expected[2], rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", ["native/fmi3"])
 def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
     """Without ranges to search: one of them starts at zero, and both have the scale of the table."""
@@ -383,7 +384,9 @@ def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
         assert fit[name].value == pytest.approx(value, rel=1e-4)
 
 
-@pytest.mark.parametrize("spring", [SPRING, ((-0.2, 0.2), (-40.0, 40.0))], ids=["four points", "two points"])
+@pytest.mark.parametrize(
+    "spring", slow_after(1, [(SPRING,), (((-0.2, 0.2), (-40.0, 40.0)),)]), ids=["four points", "two points"]
+)
 def test_an_argument_beyond_the_ends_is_refused_where_the_table_says_so(worker, tmp_path, spring):
     text = remove_unused(MODEL).format(friction=points(FRICTION, '"m/s", "1"'), spring=points(spring, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text.replace('ends="continue"', 'ends="refuse"'))

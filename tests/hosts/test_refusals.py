@@ -12,6 +12,7 @@ import pytest
 import worker_client
 from models import EXACT, MODELS, SIGN, THRESHOLD, declared, outputs, parameters
 from row_comparison import assert_identical
+from variants import slow_after
 from worker_client import FmiError
 
 BACKENDS = ("python", "native", "FMI 3.0")
@@ -132,7 +133,7 @@ def invalid_starts():
                 yield name, {variable: value}, [*words, repr(value)]
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", slow_after(2, MODELS))
 def test_an_invalid_start_value_is_refused_by_name_with_the_allowed_ones(instance, backend, name):
     """A Python FMU reads NaN until its first step, which is refused."""
     reals = [v for v in outputs(name) if declared(name)[v].type == "Real"]

@@ -12,12 +12,13 @@ from zlib import crc32
 import pytest
 from models import MODELS, model_class, outputs, runtime
 from row_comparison import assert_identical
+from variants import slow_after
 from worker_client import FmiError, Worker
 
 from fmus.compiler.lowering import sibling_module
 
 TIMES = 10_000 // len(MODELS)
-EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+EVERY_MODEL = pytest.mark.parametrize("name", slow_after(2, MODELS))
 REFUSAL = (
     "a saved state is refused: another FMU wrote it or it has been changed; "
     "save the state again and pass it on unchanged"

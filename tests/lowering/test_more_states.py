@@ -7,6 +7,7 @@ import pytest
 from contact_references import PROBLEMS, reference_events
 from internal_steps import bits, components, compute_step, list_steps, prepared_run, scalar_steps, start
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RADAU9, RODAS, ROOT
+from variants import slow_after
 
 from fmus.compiler.lowering import lowered_model, select_features
 from fmus.compiler.model_lookup import find_model
@@ -62,7 +63,7 @@ def test_bristles_agree_with_an_independent_solver(method):
 
 
 @pytest.mark.parametrize(  # two methods for each model, in turn
-    ("name", "method"), [(name, method) for name, method in zip(2 * [*PROBLEMS], cycle(RTOL), strict=False)]
+    ("name", "method"), slow_after(2, zip(2 * [*PROBLEMS], cycle(RTOL), strict=False))
 )
 def test_contacts_stick_and_slip_as_in_an_independent_solver(name, method):
     events, end = reference_events(name)

@@ -129,7 +129,7 @@ def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
             assert columns[variable] == solved[variable]
 
 
-@pytest.mark.parametrize("name", ["stickslip", "pacejka"])
+@pytest.mark.parametrize("name", slow_after(1, ["stickslip", "pacejka"]))
 def test_a_second_solver_agrees(worker, fmus, name):
     """scipy's DOP853, or Radau on stiff models, which also takes at least one evaluation per step."""
     truth, fmu = TRUTHS[name], worker.exchange(fmus / f"{name}.fmu").begin()

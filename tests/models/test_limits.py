@@ -3,7 +3,7 @@
 from math import isnan
 
 import pytest
-from models import BODIES, EXACT, FEW_CASES, MODELS, declared, label, model_class, outputs, push
+from models import BODIES, EXACT, FEW_CASES, declared, label, outputs, push, scalar_class
 from worker_client import FmiError
 
 REACTION = 2  # of a pendulum whose squared load overflows much earlier: many steps, then another message
@@ -15,26 +15,8 @@ def force_free_values(name):
     return dict.fromkeys(set(FORCES) & declared(name).keys(), 0.0)
 
 
-def is_free(name):
-    """Return whether no other force acts on its body, which starts as set."""
-    model = model_class(name)()
-    for variable, value in force_free_values(name).items():
-        setattr(model, variable, value)
-    model.prepare()
-    return (
-        name in BODIES
-        and f"{outputs(name)[1]}0" in declared(name)
-        and model.rates(0.0, 0.1, 1.0, *[1] * model.has_dry_friction) == 0
-    )
-
-
-FREE = {name for name in MODELS if is_free(name)}
-SMOOTH = [case for case in FEW_CASES if case[1]["solver.method"] != EXACT and case[0] in FREE]
-DRIVEN = [case for case in FEW_CASES if case[1].get("pin_load") != REACTION and case[0] in FREE]
-
-
-def test_most_models_can_be_force_free():
-    assert {"smd", "coulomb", "stickslip", "pacejka", "pendulum"} <= FREE
+SMOOTH = [case for case in FEW_CASES if case[1]["solver.method"] != EXACT and case[0] in BODIES]
+DRIVEN = [case for case in FEW_CASES if case[1].get("pin_load") != REACTION and case[0] in BODIES]
 
 
 @pytest.mark.parametrize("has_stop_time", [True, False], ids=["stop known", "stop unknown"])
@@ -44,7 +26,7 @@ def test_the_largest_step_is_a_tenth_of_the_run(launch, case, has_stop_time):
     name, values, _ = case
     v0 = f"{outputs(name)[1]}0"
     for start, run in ((0.0, 3.0), (-50.0, 200.0), (7.3, 0.01)):
-        tenth = 0.1 * (run if has_stop_time else model_class(name).stop_time)
+        tenth = 0.1 * (run if has_stop_time else scalar_class(name).stop_time)
         stop = start + 20.0 * tenth if not has_stop_time else start + run
         fmu = launch(
             name, {**values, **force_free_values(name), v0: 1.0}, start=start, stop=stop if has_stop_time else None

@@ -89,7 +89,7 @@ def test_a_linear_speed_is_followed_exactly_at_any_communication_step(worker, ba
         fmu.free()
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", slow_after(2, BACKENDS))
 def test_a_belt_that_goes_to_and_fro_is_followed(worker, backend):
     """The acceleration is a staircase between communication points; friction sticks all the same."""
     events, motion = solve_block(belt_shaking, 3.0, k=30.0, hold=12.0, slide=8.0)
@@ -234,7 +234,8 @@ def test_a_kink_with_one_row_is_an_event_as_one_with_two_rows(at_kink):
     assert run.statistics.evaluations < 1.05 * expected.statistics.evaluations
 
 
-@pytest.mark.parametrize(("count", "noise"), slow_after(1, [(1000, 1e-3), (5, 0.0), (40, 0.1)]))
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "noise"), [(1000, 1e-3), (5, 0.0), (40, 0.1)])
 def test_a_smooth_or_noisy_table_has_no_kinks(count, noise):
     t = np.linspace(0.0, 4.0, count)
     random = np.random.default_rng(count)
@@ -462,7 +463,7 @@ def test_a_load_follows_a_position_with_its_speed_and_acceleration(worker, backe
     fmu.free()
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
 def test_the_closed_form_continues_a_load_by_its_rate(worker, backend):
     """The end of the spring moves as 0.05 t m; methods with steps agree with the closed form."""
     a_end = '    a_end = Input(0.0, "m/s2", "acceleration of the end of the spring")\n'

@@ -72,7 +72,7 @@ def test_a_command_that_needs_an_extra_names_it(without_extras, user, words, ext
     assert f"python -m pip install 'friction-fmus[{extra}]'" in output
 
 
-@pytest.mark.parametrize("form", ["clone", "wheel"])
+@pytest.mark.parametrize("form", ["clone", pytest.param("wheel", marks=pytest.mark.campaign)])
 def test_the_named_command_adds_an_extra_to_a_clone_and_to_a_wheel(wheel, tmp_path, form):
     """pip finds the extras in the installed project, without an index, and the packages of the extras."""
     extras = sorted(set(EXTRAS.values()) | {"records", "peers", "importers"})
@@ -99,6 +99,7 @@ harness.simulate(stop="late")
 """
 
 
+@pytest.mark.campaign
 def test_mypy_finds_the_types_of_a_clone_from_another_folder(tmp_path):
     environment = tmp_path / "environment"
     make_environment(environment)

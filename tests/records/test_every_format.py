@@ -8,11 +8,18 @@ import numpy as np
 import pytest
 import record_formats
 from record_formats import FORMATS, LIBRARIES, T
-from variants import slow_after
 
 from harness import SceneError, read_record
 
 X = record_formats.positions()
+# read by the code of other formats
+LIKE_OTHERS = (
+    "timetable73.mat",
+    "frame.parquet",
+    "signals.mat",
+    "structure73.mat",
+    "fields.h5",
+)
 
 
 def write(folder, form):
@@ -25,7 +32,15 @@ def write(folder, form):
     return path
 
 
-@pytest.mark.parametrize("form", [form for form in FORMATS if not form.refusal], ids=lambda form: form.file)
+@pytest.mark.parametrize(
+    "form",
+    [
+        pytest.param(form, marks=pytest.mark.slow if form.file in LIKE_OTHERS else ())
+        for form in FORMATS
+        if not form.refusal
+    ],
+    ids=lambda form: form.file,
+)
 def test_every_format_of_a_decay_is_the_same_record(tmp_path, form):
     record = read_record(write(tmp_path, form), **form.options)
     assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
@@ -82,7 +97,8 @@ def load_from_mat(path, add_table_attrs):
 """
 
 
-@pytest.mark.parametrize("attribute", slow_after(1, ["varUnits", "VariableUnits"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("attribute", ["varUnits", "VariableUnits"])
 def test_units_of_a_matlab_table_are_read(tmp_path, monkeypatch, attribute):
     """From a table with units as the library reads it, which cannot write one."""
     path = write(tmp_path, next(form for form in FORMATS if form.file == "timetable.mat"))

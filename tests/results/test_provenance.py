@@ -30,7 +30,7 @@ DRAWN = "decay/coulomb"  # the others are not drawn; test_figures.py checks that
 harness = commands.harness
 
 
-@pytest.fixture(scope="module", params=COMMANDS)
+@pytest.fixture(scope="module", params=slow_after(len(COMMANDS) - 1, COMMANDS))
 def example_run(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
     workspace, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]

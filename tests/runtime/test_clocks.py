@@ -67,7 +67,7 @@ DIPS = {
 }
 
 
-@pytest.fixture(scope="module", params=DIPS)
+@pytest.fixture(scope="module", params=slow_after(1, DIPS))
 def held(request, tmp_path_factory):
     return lower(tmp_path_factory.mktemp("models"), CONSTANT, DIPS[request.param])
 

@@ -173,11 +173,14 @@ def test_contacts_whose_effects_on_each_other_cancel_move_as_single_ones(custom_
 @pytest.mark.parametrize("method", slow_after(1, [DOP853, ODE23, ODE45, RODAS]))
 @pytest.mark.parametrize(
     ("belt", "second_speed"),
-    [
-        ("choose(clock < second, u, 3.0 * u)", 0.6),
-        ("choose(clock < second, u, -u)", -0.2),
-        ("choose(x1 < 0.19 * metre, u, 3.0 * u)", 0.6),
-    ],
+    slow_after(
+        1,
+        [
+            ("choose(x1 < 0.19 * metre, u, 3.0 * u)", 0.6),
+            ("choose(clock < second, u, 3.0 * u)", 0.6),
+            ("choose(clock < second, u, -u)", -0.2),
+        ],
+    ),
 )
 def test_a_block_slides_where_the_speed_of_its_belt_jumps(custom_model, belt, second_speed, method):
     """The block follows the belt after 0.1 s, and is at 0.19 m after 1 s, where the speed jumps; closed form."""
@@ -350,7 +353,7 @@ def stack(without=""):
 
 def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
     model, draw, n_choices = custom_model(*stack(), methods=["ode45"]), np.random.default_rng(0), 0
-    for _ in range(500):
+    for _ in range(200):
         mu_s = draw.uniform(0.2, 0.6)
         mu_d = mu_s * draw.choice([1.0, draw.uniform(0.4, 1.0)])
         x = draw.normal(0.0, 0.3, 3) * draw.choice([0.3, 1.0, 2.0])
@@ -364,7 +367,7 @@ def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
         assert modes in solutions
         assert modes.count(0) == max(one.count(0) for one in solutions)
         n_choices += len(solutions) > 1
-    assert n_choices > 30
+    assert n_choices > 10
 
 
 @pytest.mark.slow

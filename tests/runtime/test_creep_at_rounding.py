@@ -4,7 +4,6 @@ import fmpy
 import pytest
 from build_cache import build_user_model
 from native_fmus import require_compiler
-from variants import slow_after
 
 AXIS = '''from fmus import Contact, Mode, Model, Output, Parameter, State, Table, fabs
 
@@ -39,7 +38,8 @@ FRICTION = {  # declaration and sliding force
 }
 
 
-@pytest.mark.parametrize("kind", slow_after(1, FRICTION))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FRICTION)
 def test_slips_within_the_tolerance_take_few_steps(tmp_path, kind):
     """The load equals the friction but for rounding errors, or slips are too slow for the error control to see."""
     require_compiler()

@@ -67,7 +67,7 @@ def test_the_free_oscillator_agrees_almost_without_spring_or_damper(launch, k, c
         compare(launch, "smd", {"k": k, "c": c, "F_ext": push}, x0=0.1, v0=0.5)
 
 
-@pytest.mark.parametrize("c", slow_after(2, [0.0, 2.0, 24.0, 24.0 * (1 + 1e-12), 60.0]))
+@pytest.mark.parametrize("c", slow_after(1, [2.0, 0.0, 24.0, 24.0 * (1 + 1e-12), 60.0]))
 def test_the_coulomb_oscillator_agrees_for_every_damping(launch, c):
     compare(launch, "coulomb", {"k": 144.0, "c": c, "f": 0.7}, x0=0.1, run=5.0)
     compare(launch, "coulomb", {"k": 144.0, "c": c, "f": 0.7, "F_ext": -3.0}, x0=0.01, v0=2.0, run=5.0)

@@ -110,7 +110,7 @@ def follow(cls, values, h_max, duration):
 
 @pytest.mark.parametrize(
     ("push", "method"),
-    slow_after(2, [({}, ODE23), ({"B": 1000.0, "tau": 1e-4}, DOP853), ({"B": 50.0}, ODE45), ({}, RODAS)]),
+    slow_after(1, [({}, ODE23), ({"B": 1000.0, "tau": 1e-4}, DOP853), ({"B": 50.0}, ODE45), ({}, RODAS)]),
     ids=str,
 )
 def test_a_motion_from_rest_has_the_same_bits_in_runs_of_any_length(model, method, push):

@@ -20,6 +20,7 @@ from models import (
     outputs,
     runtime,
 )
+from variants import slow_after
 
 from fmus.compiler.lowering import lowered_files, lowered_model
 from fmus.compiler.model_lookup import find_model
@@ -265,7 +266,11 @@ def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
     assert isnan(read(instance, "x")[0])
 
 
-@pytest.mark.parametrize("source", [*MODELS, *LARGER_MODELS], ids=lambda source: getattr(source, "stem", source))
+@pytest.mark.parametrize(
+    "source",
+    slow_after(len(MODELS), [*MODELS, *LARGER_MODELS]),
+    ids=lambda source: getattr(source, "stem", source),
+)
 def test_a_model_owns_numbers_only_and_no_part_of_the_solver(source):
     owned = {type(value) for value in vars(lowered_model(source)()).values()}
     assert {kind.__name__ for kind in owned} <= {"bool", "float", "int", "list", "InputPolynomial"}

@@ -106,7 +106,7 @@ def test_a_contact_at_rest_stays_stuck_where_its_limit_touches_the_load(worker, 
 
 
 @pytest.mark.parametrize(("solver", "tolerances"), [("CVode", (1e-3, 1e-9)), ("Euler", (1e-3,))])
-@pytest.mark.parametrize("name", ["touching_block", "touching_stack"])
+@pytest.mark.parametrize("name", slow_after(1, ["touching_stack", "touching_block"]))
 def test_it_stays_stuck_in_model_exchange(worker, built, name, solver, tolerances):
     path = built(name, "native")
     for values in TOUCHES:

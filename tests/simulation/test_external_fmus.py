@@ -65,7 +65,7 @@ def assert_refused(done, status, *sentences):
         assert sentence in done.stderr
 
 
-@pytest.mark.parametrize("name", ["Midpoint", "Fmi3Midpoint", "ModelExchangeOnly"])
+@pytest.mark.parametrize("name", slow_after(1, ["Midpoint", "Fmi3Midpoint", "ModelExchangeOnly"]))
 @pytest.mark.parametrize("tolerance", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, tolerance):
     done, rows = run(name, "--set", "k=50", "--rtol", tolerance)
@@ -173,10 +173,13 @@ tolerance = 1e-4
 
 @pytest.mark.parametrize(
     ("name", "outputs", "more", "columns"),
-    [
-        ("Arrays", ["place[2]", "says", "turn"], "grid = 0.01\n[values]\nsense = 'right'\nbegin = [0, 2]", None),
-        ("ModelExchangeOnly", ["v"], "exchange = true", ["v"]),
-    ],
+    slow_after(
+        1,
+        [
+            ("Arrays", ["place[2]", "says", "turn"], "grid = 0.01\n[values]\nsense = 'right'\nbegin = [0, 2]", None),
+            ("ModelExchangeOnly", ["v"], "exchange = true", ["v"]),
+        ],
+    ),
 )
 def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, more, columns):
     (tmp_path / "mine.toml").write_text(
@@ -426,7 +429,7 @@ def repeat_variable(count, causality):
     return lambda text: text.replace("</ModelVariables>", f"{variables}</ModelVariables>")
 
 
-@pytest.mark.parametrize(("causality", "count"), [("output", 3000), ("local", 3000)])
+@pytest.mark.parametrize(("causality", "count"), slow_after(1, [("output", 3000), ("local", 3000)]))
 def test_an_fmu_with_many_variables_runs_or_is_refused(run, external_fmu_folder, tmp_path, causality, count):
     """By default all outputs are recorded, but not the local variables of an FMU that has outputs."""
     changes = edited_description(repeat_variable(count, causality))

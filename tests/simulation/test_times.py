@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from external_fmus import build_external_fmus
 from fmi3_fixtures import build_fmi3_fmus
+from variants import slow_after
 
 import harness
 
@@ -45,7 +46,8 @@ def test_a_run_stops_at_the_last_time(fmus, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "interface"), [("Midpoint", None), ("Fmi3Midpoint", None), ("ModelExchangeOnly", "ModelExchange")]
+    ("name", "interface"),
+    slow_after(1, [("Midpoint", None), ("Fmi3Midpoint", None), ("ModelExchangeOnly", "ModelExchange")]),
 )
 def test_an_external_fmu_is_recorded_at_times(name, interface):
     times = UNEVEN / 8.0

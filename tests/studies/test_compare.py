@@ -450,19 +450,17 @@ def test_a_name_longer_than_its_column_is_printed_in_full(tmp_path):
 
 @pytest.mark.parametrize(
     ("pair", "message"),
-    [
-        (("Midpoint", "ModelExchangeOnly"), "fmpy's CVode at rtol"),
-        (("Arrays", "Arrays"), "turn[1,2]"),
-        *(
-            pytest.param((one, other), message, marks=pytest.mark.slow)
-            for one, other, message in (
-                ("Fmi3Midpoint", "NonConforming", "NonConforming: internal steps"),
-                ("FixedStep", "FixedStep", "fixed internal step"),
-                ("Switching", "Switching", "says"),
-                ("Bouncing", "Bouncing", "bounces"),
-            )
-        ),
-    ],
+    slow_after(
+        1,
+        [
+            (("Midpoint", "ModelExchangeOnly"), "fmpy's CVode at rtol"),
+            (("Arrays", "Arrays"), "turn[1,2]"),
+            (("Fmi3Midpoint", "NonConforming"), "NonConforming: internal steps"),
+            (("FixedStep", "FixedStep"), "fixed internal step"),
+            (("Switching", "Switching"), "says"),
+            (("Bouncing", "Bouncing"), "bounces"),
+        ],
+    ),
 )
 def test_external_fmus_are_compared(harness, external_fmu_folder, pair, message):
     one, two = (external_fmu_folder / f"{name}.fmu" for name in pair)

@@ -72,8 +72,11 @@ def fit_drawn(name, seed, max_samples):
     return record, fit
 
 
-SLOW = {"force": pytest.mark.slow, "position, 4 free": pytest.mark.slow, "Stribeck": pytest.mark.slow}
-CAMPAIGN = {"forced": pytest.mark.campaign, "belt": pytest.mark.campaign}
+SLOW = {
+    "force": pytest.mark.slow,
+    "position, 4 free": pytest.mark.slow,
+}
+CAMPAIGN = dict.fromkeys(("forced", "belt", "Stribeck"), pytest.mark.campaign)
 
 
 @pytest.mark.parametrize(
@@ -589,9 +592,7 @@ def test_one_noise_of_all_samples_does_not_move_the_fit(model, omega, free):
     t = np.linspace(0.0, 5.0 if model == "coulomb" else 2.5, 26)
     record = {"t [s]": t, "x [m]": np.cos(omega * t)}
     options = {"observe": "x", "values": {"x0": 1.0}}
-    fits = [
-        harness.fit(native(model), record, free, sigma={"x": 2.0**power}, **options) for power in (-60, -7, -1, 0, 20)
-    ]
+    fits = [harness.fit(native(model), record, free, sigma={"x": 2.0**power}, **options) for power in (-60, 0, 20)]
     assert all(fit.values == fits[0].values for fit in fits)
     assert fits[-1].undetermined == tuple(free)
     assert fits[-1]._headline == ", ".join(f"{name} not determined" for name in free)

@@ -96,7 +96,7 @@ def hartog(frequency, m=1.0, k=100.0, force=10.0, friction=6.0):
 
 
 def test_a_forced_oscillator_without_stops_has_the_amplitude_of_den_hartog():
-    result = harness.orbit(native("forced"), over={"Omega": [5.0, 7.0, 9.0, 13.0]})
+    result = harness.orbit(native("forced"), over={"Omega": [5.0, 7.0, 13.0]})
     stops, *others = result.motions
     assert (stops.kind, stops.n_sticks) == ("stick-slip", 2)
     for orbit in others:
@@ -160,7 +160,7 @@ def test_a_forced_mass_has_the_counts_of_stops_of_hong_and_liu():
         assert [(orbit.n_sticks, orbit.stability) for orbit in result.motions] == [(stops, "stable")]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_an_edge_between_counts_of_stops_is_one_point():
     """Near it the count is a matter of rounding errors."""
     result = harness.map_motions(native("forced"), {"Omega": [0.6, 0.68]}, {"f": 2.0})

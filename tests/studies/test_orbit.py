@@ -152,6 +152,7 @@ def test_two_orbits_meet_in_a_fold():
     assert point.value == pytest.approx(brentq(largest, -0.0125, -0.0115, xtol=1e-13), abs=1e-10)
 
 
+@pytest.mark.slow
 def test_an_orbit_is_found_where_large_amplitudes_are_overdamped():
     """A motion that starts with a large amplitude does not turn there, and needs many steps."""
     result = harness.orbit(build_text("meeting", MEETING), {"v_b": 3.0, "c2": 1.0, "c4": 1.0})

@@ -71,7 +71,7 @@ def test_the_plotted_steps_are_those_of_the_solver(draw):
     assert len(t) + 1 == len(run.time) < 300 < len(curves(panels)["position of the mass"][0])
 
 
-@pytest.mark.parametrize("name", MODAL)
+@pytest.mark.parametrize("name", slow_after(1, MODAL))
 def test_every_stick_phase_is_shaded_from_its_start(draw, name):
     run, panels = draw(name)
     sticks = [] if run.events is None else run.events.t[run.events.mode == 0]
@@ -81,7 +81,7 @@ def test_every_stick_phase_is_shaded_from_its_start(draw, name):
         assert len(sticks) - len(stuck) <= (name == "coulomb")  # whose last one begins after the end
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", slow_after(2, SCENES))
 def test_no_legend_covers_a_title(draw, name):
     _, panels = draw(name)
     assert [title for title, axes in panels.items() if is_title_covered(axes)] == []
@@ -115,14 +115,17 @@ def test_angles_are_in_degrees(draw):
 
 @pytest.mark.parametrize(
     ("name", "title", "figures"),
-    [
-        ("smd", "position of the mass", ["sample_0", "sample_n"]),
-        ("coulomb-sign", "position of the mass", ["sample_0", "sample_n"]),
-        ("pendulum", "angle, zero when hanging down", ["x_0", "x_n"]),
-        ("stickslip", "speed of the sled", ["peak_speed"]),
-        ("stickslip", "acceleration of the sled", ["peak_acceleration"]),
-        ("stickslip-threshold", "speed of the sled", ["peak_speed"]),
-    ],
+    slow_after(
+        2,
+        [
+            ("smd", "position of the mass", ["sample_0", "sample_n"]),
+            ("stickslip", "speed of the sled", ["peak_speed"]),
+            ("coulomb-sign", "position of the mass", ["sample_0", "sample_n"]),
+            ("pendulum", "angle, zero when hanging down", ["x_0", "x_n"]),
+            ("stickslip", "acceleration of the sled", ["peak_acceleration"]),
+            ("stickslip-threshold", "speed of the sled", ["peak_speed"]),
+        ],
+    ),
 )
 def test_a_known_value_is_shown_with_its_kind(draw, name, title, figures):
     kind = "reference" if name == "stickslip" else "published"

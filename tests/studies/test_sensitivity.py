@@ -172,7 +172,7 @@ def test_conditions_and_parameters_that_are_fixed_have_derivatives(pair):
         assert s.left[:, i] == pytest.approx(expected, rel=1e-9, abs=1e-10 * np.abs(expected).max()), parameter
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", slow_after(2, MODELS))
 def test_fmi_3_has_the_same_derivatives(name):
     by = {"pendulum": ["mu", "theta0"], "smd": ["c", "x0"], "coulomb": ["f", "x0"]}.get(name, ["mu_s", "k"])
     times = [0.5, 1.0, 5.0] if name != "coulomb" else [0.5, 1.0, 3.0]
@@ -261,7 +261,7 @@ def test_a_force_that_touches_the_limit_at_its_corner_is_reported():
 
 @pytest.mark.parametrize(
     "seed",
-    [pytest.param(n, marks=pytest.mark.slow if n in (3, 8, 10) else pytest.mark.campaign) for n in range(30)],
+    [pytest.param(n, marks=pytest.mark.slow if n == 8 else pytest.mark.campaign) for n in range(30)],
 )
 def test_derivatives_of_random_models_are_those_of_differences(seed, tmp_path):
     """Up to three bodies and contacts, with belts, drivers, limited loads and falling friction.

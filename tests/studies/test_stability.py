@@ -307,6 +307,7 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     assert (tmp_path / "results/precision/relax/points.csv").is_file()
 
 
+@pytest.mark.slow
 def test_a_case_whose_reference_misses_a_pulse_is_wrong(tmp_path):
     (tmp_path / "pulses.py").write_text(PULSES)
     assert commands.build("pulses.py", folder=tmp_path).returncode == 0
