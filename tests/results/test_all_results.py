@@ -75,7 +75,9 @@ def moving_sled():
 
 
 def mapped_sled():
-    return harness.map_motions(build_native_fmus() / "stickslip.fmu", {"mu_d": [0.6, 0.75, 0.9], "k": [700.0, 750.0, 800.0]})
+    return harness.map_motions(
+        build_native_fmus() / "stickslip.fmu", {"mu_d": [0.6, 0.75, 0.9], "k": [700.0, 750.0, 800.0]}
+    )
 
 
 def measured_precision():
