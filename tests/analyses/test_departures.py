@@ -76,6 +76,15 @@ def test_hum_widens_the_intervals():
 
 
 @pytest.mark.slow
+def test_a_wander_that_resembles_a_negative_loss_is_reported_and_covered():
+    t = np.linspace(0.0, 8.0, 800)
+    record = decay_record(b=0.5, t=t, noise=2e-4, rest=0.0, seed=12)
+    fits = [identify(record._replace(x=record.x * (1 - size * t * (8 - t) / 16))) for size in (0.0, 0.0015)]
+    assert ["A loss below zero would fit better" in " ".join(fit.remarks) for fit in fits] == [False, True]
+    assert all(fit["b"].low < 0.5 < fit["b"].high for fit in fits)
+
+
+@pytest.mark.slow
 def test_a_sustained_oscillation_whose_amplitude_wanders_has_no_interval():
     t = np.arange(0, 40.0, 0.02)
     for seed in range(4):

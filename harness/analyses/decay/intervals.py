@@ -97,12 +97,15 @@ def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms, cho
     unconstrained = p[unknowns] - inverse @ (jacobian.T @ e) / scale
     correlation, losses = to_correlation(inverse), (unknowns >= ZETA) & (variance > 0)
     z = unconstrained[losses] * scale[losses] / np.sqrt(variance[losses])
+    distance = nearest_means(z, correlation[np.ix_(losses, losses)])[1] if len(z) else 0.0
+    if distance > thresholds.NEGATIVE and not dependences.sizes:
+        errors = np.where(unknowns >= ZETA, distance * errors, errors)
     return FitUncertainty(
         unknowns,
         special.ndtri(1 - (1 - UPPER) / choices) / NORMAL_QUANTILE * errors,
         correlation,
         unconstrained,
-        nearest_means(z, correlation[np.ix_(losses, losses)])[1] if len(z) else 0.0,
+        distance,
         rms,
         neighbour_correlation,
         is_correlated,

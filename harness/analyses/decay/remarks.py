@@ -84,6 +84,9 @@ def make_remarks(
             f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. {WIDENED}"
         )
     named = dependences_remark(problem, uncertainty.dependences.sizes, unit)
+    if not named and (distance := uncertainty.distance_from_losses) > thresholds.NEGATIVE:
+        reason = "as with an amplitude that wanders"
+        named = [f"A loss below zero would fit better, by {distance:.1f} standard errors, {reason}. {WIDENED}"]
     return (*remarks, *named, *rounding_remark(problem, full, unit))
 
 
