@@ -59,9 +59,16 @@ def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Depe
     unknowns = problem.unknowns(terms)
     sizes: dict[str, float] = {}
     variances, columns = np.zeros(len(inverse)), jacobian
-    basis = orthonormal(jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)])  # a loss at its bound hides no first cause
+    free = orthonormal(jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)])  # without losses at their bounds
     while effects:
-        found = {name: effect_variance(effect, e, basis, width) for name, effect in effects.items()}
+        basis = orthonormal(columns)
+        found = {
+            name: effect_variance(effect, e, free if name == "speed" else basis, width)
+            for name, effect in effects.items()
+        }
+        if not sizes and max(gain for _, gain in found.values()) < thresholds.PROVEN:
+            # a loss at its bound hides no departure that only its negative value would follow
+            found = {name: effect_variance(effect, e, free, width) for name, effect in effects.items()}
         name, (variance, gain) = max(found.items(), key=lambda item: item[1][1])
         if gain < thresholds.PROVEN:
             break
@@ -69,7 +76,6 @@ def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Depe
         effects.pop("speed", None)  # it follows what any other cause leaves, so that it counts as the first one only
         variances += variance * ((inverse @ (jacobian.T @ effect)) ** 2).sum(axis=1)
         columns = np.column_stack([columns, effect])
-        basis = orthonormal(columns)
         sizes[name] = float(np.sqrt(variance * np.mean((effect**2).sum(axis=1))))
     return Dependences(sizes, variances)
 
