@@ -246,5 +246,15 @@ def identify_record(
     by_extrema, no_extrema = estimate_from_extrema(record, problem, extrema, laws[0], parameters, omega)
     by_two_peaks, no_peaks = estimate_from_two_peaks(record, problem, extrema, laws[0], parameters, omega)
     unavailable = {"turning points": no_extrema, "two peaks": no_peaks}
-    results = (problem, laws, uncertainty, estimates, by_extrema, by_two_peaks, unavailable, tuple(remarks))
-    return DecayIdentification(record, extrema, *results)
+    return DecayIdentification(
+        record,
+        extrema,
+        problem,
+        laws,
+        uncertainty,
+        estimates,
+        by_extrema,
+        by_two_peaks,
+        unavailable,
+        tuple(remarks),
+    )
