@@ -219,7 +219,7 @@ def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(sweep):
 
 
 def test_a_profiler_that_keeps_frames_disturbs_no_run(sweep):
-    """As that of Dask does for a moment: the recorded points of one run are then still referenced in the next one."""
+    """The recorded points of one run are then still referenced in the next one."""
     grid, frames = {"mu_d": [0.5, 0.6]}, []
     sys.setprofile(lambda frame, event, value: frames.append(frame) if frame.f_code.co_name == "read_rows" else None)
     try:
