@@ -222,7 +222,8 @@ def describe_further_runs(candidates: Sequence[Column], time_column: Column, mot
 def read_times(table: Table, time_column: Column, columns: ColumnOptions) -> np.ndarray:
     """Return times (n,) in s."""
     cells = table.columns[time_column.index]
-    first_text = next((cell for cell in cells if isinstance(cell, str) and cell), None)
+    texts = () if isinstance(cells, np.ndarray) and cells.dtype.kind == "f" else cells
+    first_text = next((cell for cell in texts if isinstance(cell, str) and cell), None)
     if first_text is not None and ":" in first_text and TIMESTAMP.match(first_text):
         return parse_timestamps(cells, table.name)  # type: ignore[arg-type]
     unit = time_column.unit
