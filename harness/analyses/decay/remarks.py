@@ -85,8 +85,10 @@ def make_remarks(
         )
     named = dependences_remark(problem, uncertainty.dependences.sizes, unit)
     if not named and (distance := uncertainty.distance_from_losses) > thresholds.NEGATIVE:
-        reason = "as with an amplitude that wanders"
-        named = [f"A loss below zero would fit better, by {distance:.1f} standard errors, {reason}. {WIDENED}"]
+        named = [
+            f"A loss below zero would fit better, by {distance:.1f} standard errors, as with an amplitude that "
+            f"wanders. {WIDENED}"
+        ]
     return (*remarks, *named, *rounding_remark(problem, full, unit))
 
 
@@ -138,8 +140,11 @@ def ambiguity_remark(problem: DecayProblem, laws: tuple[FittedLaw, ...]) -> tupl
         difference, is_larger = deviance_difference(problem, law, best), set(best.terms) < set(law.terms)
         excess = law.sum_of_squares - best.sum_of_squares
         size = np.sqrt(max(excess, 0.0) / n) / problem.signal_rms
-        is_close = difference > 0 and law.bic - best.bic < thresholds.CLEAR_BIC
-        if difference < -thresholds.SIGNIFICANT_DEVIANCE if is_larger else is_close:
+        if is_larger:
+            is_rival = difference < -thresholds.SIGNIFICANT_DEVIANCE
+        else:
+            is_rival = difference > 0 and law.bic - best.bic < thresholds.CLEAR_BIC
+        if is_rival:
             rivals.append((f"{law.description} ({law.bic - best.bic:+.1f})", difference))
         elif not is_larger and 0 < excess < best.sum_of_squares and size < thresholds.SIMILAR:
             similar.append(f"{law.description} ({100 * size:.1g} %)")

@@ -125,6 +125,6 @@ CLEAR_BIC = 6.0  # difference of BIC: odds of 20 to 1
 SIMILAR = 1e-3  # of the motion, between two laws: few sensors are as linear
 SIGNIFICANT_DEVIANCE = 4.0  # of n ln(squares): an unnecessary term exceeds it in one record of twenty
 SIGNIFICANT_GAIN = 5.0  # standard errors of the losses from the nearest ones that are not negative
-NEGATIVE = 2.0  # standard errors of the same: white noise exceeds it in one record of 30
+NEGATIVE = 2.0  # standard errors from losses that are not negative: white noise exceeds it in one record of 30
 MIN_ROUNDED = 6  # turning points for a test of their positions between quantiser steps
 RAYLEIGH_LIMIT = 12.0  # of n R^2, R the mean of n positions on a circle: exceeded in one record of a hundred thousand

@@ -5,7 +5,6 @@ from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import pairwise
-from operator import ne
 from threading import Lock
 from typing import NamedTuple, Protocol
 
@@ -211,7 +210,7 @@ def search_points(labels: Labels, points: np.ndarray, axes: tuple[str, ...]) -> 
                         name, names[at] = names[at], label(end)
                         is_final &= names[at] == name
     below, above = [edge.below for edge in edges], [edge.above for edge in edges]
-    n_gaps = sum(map(ne, [names[0], *above], [*below, names[-1]]))
+    n_gaps = sum(one != other for one, other in zip([names[0], *above], [*below, names[-1]], strict=True))
     return Line(names, edges, labels.n_runs - before, [*failures.values()], n_gaps)
 
 
