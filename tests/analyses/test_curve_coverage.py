@@ -8,7 +8,7 @@ from benchmarks.campaigns.curve_coverage import DRAWN, check_record
 RECORDS = 2 * len(DRAWN)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_intervals_cover_the_drawn_constants_and_the_drawn_law_is_chosen():
     rows = [check_record(number) for number in range(RECORDS)]
     covered = [value for *_, shares, _ in rows for value in shares.values()]

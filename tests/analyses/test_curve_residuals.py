@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 from benchmarks.campaigns.hidden_defects import curve_record, preslide
@@ -32,7 +32,7 @@ def assert_covers(curve, margin=1.0, **truth):
         assert low <= value <= high, (name, value, estimate, curve.remarks)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("share", "changes", "remark"),
     [
@@ -50,7 +50,7 @@ def test_friction_that_drifts_is_no_bias_and_no_asymmetry(share, changes, remark
     assert any(remark in text for text in curve.remarks)
 
 
-@pytest.mark.parametrize("time_constant", slow_after(1, [0.08, 0.02]))
+@pytest.mark.parametrize("time_constant", campaign_after(1, [0.08, 0.02]))
 def test_a_lag_of_the_force_is_estimated(time_constant):
     keep = np.exp(-0.005 / time_constant)
     curve = identify(T, V, lfilter([1 - keep], [1, -keep], stribeck(V)))
@@ -59,7 +59,7 @@ def test_a_lag_of_the_force_is_estimated(time_constant):
     assert any("The force lags the velocity" in text for text in curve.remarks)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_presliding_suggests_the_option_that_leaves_it_out():
     force = preslide(np.cumsum(V) * 0.005, V, stribeck(V, F_s=10.48), 5e-4)
     curve = identify(T, V, force)
@@ -112,7 +112,7 @@ def test_intervals_contain_what_the_steps_of_a_code_without_zero_hide(seed):
     assert all(item.low <= truth[item.name][0] <= item.high for item in curve.estimates)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_pauses_do_not_replace_the_samples_that_move():
     v = np.concatenate(
         [np.concatenate([np.zeros(200), 0.5 * np.sin(np.pi * np.arange(120) / 120) * s]) for s in [1, -1] * 6]

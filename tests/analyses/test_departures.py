@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from decays import Signal, decay_record, identify
-from variants import slow_after
+from variants import campaign_after
 
 from harness import HarnessError
 from harness.analyses.decay.intervals import extend_interval
@@ -29,7 +29,7 @@ def errors(fit):
 
 
 @pytest.mark.parametrize(
-    ("defect", "cause"), slow_after(1, [("clock", "a clock whose rate varies"), ("gain", "another law")])
+    ("defect", "cause"), campaign_after(1, [("clock", "a clock whose rate varies"), ("gain", "another law")])
 )
 def test_a_wander_near_the_noise_is_reported_and_covered(defect, cause):
     fits = [swung(seed, **{defect: 2e-4}) for seed in range(4)]
@@ -38,7 +38,7 @@ def test_a_wander_near_the_noise_is_reported_and_covered(defect, cause):
     assert max(max(errors(fit)) for fit in fits) < 4
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_white_noise_is_no_wander():
     fits = [swung(seed) for seed in range(4)]
     assert not any("departs from the law" in " ".join(fit.remarks) for fit in fits)
@@ -84,7 +84,7 @@ def test_a_wander_that_resembles_a_negative_loss_is_reported_and_covered():
     assert all(fit["b"].low < 0.5 < fit["b"].high for fit in fits)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_sustained_oscillation_whose_amplitude_wanders_has_no_interval():
     t = np.arange(0, 40.0, 0.02)
     for seed in range(4):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from variants import slow_after
+from variants import campaign_after
 
 from harness.analyses.fit.fit_problem import FitProblem, Unknown
 from harness.analyses.fit.fit_procedure import MeasuredRecord, subdivide_inputs
@@ -53,7 +53,7 @@ def test_levels_without_a_common_step_are_not_quantised():
     assert estimate_noise(np.arange(len(x)) * 0.01, x)[1] == 0.0
 
 
-@pytest.mark.parametrize("m", slow_after(1, [1, 5, 10]))
+@pytest.mark.parametrize("m", campaign_after(1, [1, 5, 10]))
 def test_a_moving_average_of_white_noise_over_m_samples_counts_once_in_m(m):
     """Its neighbours have the correlation 1 - 1/m."""
     white = np.random.default_rng(m).normal(size=(200_000, 1))

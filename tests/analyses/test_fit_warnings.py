@@ -11,7 +11,7 @@ from variants import slow_after
 from harness import HarnessError, identify_decay
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_drift_is_reported_and_fitted_on_request():
     record = decay_record(0.01, 0.001, drift=0.002, noise=1e-4)
     assert "drift=True fits" in remarks_text(identify(record))
@@ -126,7 +126,7 @@ def test_double_peaks_of_angular_acceleration_are_reported_with_a_remedy():
         identify(angular_acceleration(3.1, noise=6.0), pendulum=True, drag=False)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("a", [2.8, 3.0])
 def test_double_peaks_of_angular_acceleration_are_fitted_if_their_cycles_are_found(a):
     fit = identify(angular_acceleration(a), pendulum=True)

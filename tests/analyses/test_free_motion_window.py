@@ -6,7 +6,7 @@ Some fits omit the laws with drag, which take most of the time.
 import numpy as np
 import pytest
 from decays import OMEGA, Signal, decay_record, identify, remarks_text, values
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 from harness.analyses.decay import decay_problem, signal_model
 
@@ -55,7 +55,7 @@ def held_in_mid_swing(swings, noise, zeta=0.015, end=2.0, hold=1e-5, rng=4):
     return Signal(t, x), stop
 
 
-@pytest.mark.parametrize("swings", slow_after(1, [9.4, 45.4]))
+@pytest.mark.parametrize("swings", campaign_after(1, [9.4, 45.4]))
 def test_a_motion_held_in_mid_swing_is_cut_and_reported(swings):
     """The noise of the whole record is that of the hold, and a short motion has few turning points before it."""
     record, stop = held_in_mid_swing(swings, 1e-3)
@@ -103,7 +103,7 @@ def test_outliers_are_excluded_and_counted():
     assert "2 of 1000 samples are outliers and are left out." in remarks_text(fit)
 
 
-@pytest.mark.parametrize("drag", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("drag", [False, pytest.param(True, marks=pytest.mark.campaign)])
 def test_single_invalid_samples_are_excluded_and_counted(drag):
     """With spurious turning points; tests/records/test_sample_defects.py has runs and marks of invalid samples."""
     record = decay_record(0.02, 0.003, rest=0.2, noise=1e-4)

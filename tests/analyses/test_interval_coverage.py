@@ -9,6 +9,7 @@ pytestmark = pytest.mark.slow
 RECORDS = 40
 
 
+@pytest.mark.campaign
 def test_intervals_cover_95_percent_and_standard_errors_match_the_scatter():
     """Parameters that may be zero are excluded, because their intervals end there and shorten those of the others."""
     widths, misses = [], []

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from decays import Signal, identify, random_record
-from variants import slow_after
+from variants import campaign_after
 
 from benchmarks.campaigns.low_speed_friction import AMPLITUDE, decay
 
 R = 0.006  # friction over stiffness at high speed, relative to the amplitude
 
 
-@pytest.mark.parametrize(("rise", "zeta"), slow_after(1, [(1.5, 0.0), (2.0, 0.003)]))
+@pytest.mark.parametrize(("rise", "zeta"), campaign_after(1, [(1.5, 0.0), (2.0, 0.003)]))
 def test_a_rise_is_named_and_widens_the_intervals(rise, zeta):
     t, x = decay(zeta, R, rise, 0.05)
     x = AMPLITUDE * (x + 1e-3 * np.random.default_rng(1).standard_normal(len(t)))

@@ -29,7 +29,7 @@ def fits(name):
     return whole, parts
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", slow_after(1, RECORDS))
 def test_the_losses_of_halves_and_thirds_of_a_measured_record_agree(name):
     _, parts = fits(name)

@@ -21,6 +21,7 @@ def of_each_law(request):
     return [(truth, identify(record, pendulum=sine)) for record, truth, _ in records]
 
 
+@pytest.mark.campaign
 def test_no_estimate_is_far_off_without_a_remark(of_each_law):
     """benchmarks/campaigns/interval_coverage.py checks many more."""
     for truth, result in of_each_law:

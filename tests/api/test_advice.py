@@ -6,7 +6,7 @@ import re
 import commands
 import numpy as np
 import pytest
-from variants import slow_after
+from variants import campaign_after
 
 import harness
 from fmus.compiler.equations.expressions import FUNCTIONS, Expression, ModelError
@@ -55,7 +55,7 @@ def test_an_fmu_in_another_folder_is_built_as_the_message_says(tmp_path):
     assert commands.harness(tmp_path, "run", "there/smd.fmu").returncode == 0
 
 
-@pytest.mark.parametrize("native", [(), pytest.param(("--native",), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("native", [(), pytest.param(("--native",), marks=pytest.mark.campaign)])
 def test_an_unknown_platform_lists_those_that_exist(native, tmp_path):
     message = commands.build("smd", "--platform", "vax", *native, "--out", tmp_path).stderr
     listed = re.search(r"choose from (\w+)", message)[1]
@@ -76,7 +76,7 @@ def test_the_product_in_place_of_a_power_has_its_value(exponent):
 
 
 @pytest.mark.parametrize(
-    ("quantity", "unit"), slow_after(1, [("position", "V"), ("velocity", "V"), ("acceleration", "V")])
+    ("quantity", "unit"), campaign_after(1, [("position", "V"), ("velocity", "V"), ("acceleration", "V")])
 )
 def test_a_record_in_volts_is_converted_as_the_remark_says(quantity, unit, tmp_path):
     t = np.linspace(0.0, 10.0, 2001)

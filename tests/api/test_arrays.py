@@ -57,7 +57,7 @@ def test_numbers_that_a_mask_hides_are_missing(user_folder, monkeypatch):
     assert "6 of 121 rows have a missing cell" in str(harness.identify_decay((t, x), unit="m", drag=False))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_time_deltas_are_seconds_and_labels_may_be_an_array(user_folder, monkeypatch):
     monkeypatch.chdir(user_folder)
     delta = pandas.to_timedelta(T, unit="s")
@@ -88,7 +88,7 @@ def test_time_stamps_are_refused_with_what_to_do(user_folder, monkeypatch, zone)
                 call()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_an_index_without_a_name_is_the_time_if_no_column_is(user_folder, monkeypatch):
     monkeypatch.chdir(user_folder)
     run = harness.simulate("smd", times=np.linspace(0.0, 4.0, 401), outputs=["x"])
@@ -118,7 +118,7 @@ def test_a_long_text_takes_the_memory_of_one_text():
     tracemalloc.stop()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_tables_of_xarray_are_records(user_folder, monkeypatch):
     pytest.importorskip("xarray")
     monkeypatch.chdir(user_folder)

@@ -57,7 +57,7 @@ def test_a_friction_curve_is_that_of_its_file(files, kind):
     assert numbers(identify_curve(KINDS[kind](path))) == numbers(identify_curve(path))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fit_is_that_of_its_file(files, kind):
     def fit(record):
@@ -75,7 +75,7 @@ def test_a_comparison_is_that_of_its_file(files, kind):
     assert result.to_pandas()["largest"].tolist() == [0.0]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_options_of_a_record_hold_in_every_function(files, tmp_path):
     """Unit, interval and column are those given to `read_record`, unless the call replaces them."""
     path = tmp_path / "bare.csv"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from external_fmus import build_external_fmus
 from native_fmus import build_native_fmus
-from variants import slow_after
+from variants import campaign_after
 
 import harness
 
@@ -76,7 +76,7 @@ def test_compare_takes_runs_folders_and_fmus():
         harness.compare(harness.simulate("smd", outputs=["F_damper"]), run)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_fit_and_a_comparison_take_any_record():
     pandas = pytest.importorskip("pandas")
     fmu = build_native_fmus() / "coulomb.fmu"  # for speed
@@ -107,7 +107,7 @@ def test_a_run_starts_at_a_given_time():
     assert (run.time[0], run.time[-1]) == (1.0, 2.0)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_decay_is_identified_from_any_source(tmp_path):
     pandas = pytest.importorskip("pandas")
     run = harness.simulate("coulomb", stop=2.0, interval=0.02, outputs=["x"])
@@ -138,7 +138,7 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "values", slow_after(1, [{}, {"solver.method": "dop853", "solver.rtol": 0.1}]), ids=["exact", "long steps"]
+    "values", campaign_after(1, [{}, {"solver.method": "dop853", "solver.rtol": 0.1}]), ids=["exact", "long steps"]
 )
 def test_a_sweep_measures_what_single_runs_measure(values):
     """Also where steps are as long as the run allows."""
@@ -167,7 +167,7 @@ def test_a_sweep_takes_enumerations_by_label(in_workspace):
         harness.sweep("stickslip", {"friction": ["hybird"]})
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_tolerance_of_a_sweep_is_that_of_its_runs():
     pytest.importorskip("xarray")
     fmu = build_external_fmus() / "Midpoint.fmu"
@@ -176,7 +176,7 @@ def test_the_tolerance_of_a_sweep_is_that_of_its_runs():
         assert float(data["final_x"][0]) == harness.simulate(fmu, {"k": 40.0}, rtol=rtol)["x"][-1]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_samples_are_reproducible_and_stored():
     pytest.importorskip("xarray")
     first = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3, folder="kept")

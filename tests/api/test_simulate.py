@@ -9,7 +9,7 @@ import native_fmus
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from variants import slow_after
+from variants import campaign_after
 
 import harness
 
@@ -103,9 +103,9 @@ def test_an_fmu_of_fmi3_runs_at_its_internal_steps_as_in_fmi2(model, options):
         assert np.array_equal(three.events.mode, two.events.mode)
 
 
-@pytest.mark.parametrize("interface", slow_after(1, ["CoSimulation", "ModelExchange"]))
+@pytest.mark.parametrize("interface", campaign_after(1, ["CoSimulation", "ModelExchange"]))
 @pytest.mark.parametrize(
-    "folder", slow_after(1, [native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus]), ids=["fmi2", "fmi3"]
+    "folder", campaign_after(1, [native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus]), ids=["fmi2", "fmi3"]
 )
 def test_input_signals_drive_every_interface(folder, interface):
     time = np.linspace(0.0, 2.0, 201)
@@ -220,7 +220,7 @@ def test_an_interval_records_every_multiple_once(in_workspace):
     assert run.time.tolist() == [0.0, 1e4, 2e4]
 
 
-@pytest.mark.parametrize("method", slow_after(1, ["ode45", "ode23", "dop853", "rodas", "radau9"]))
+@pytest.mark.parametrize("method", campaign_after(1, ["ode45", "ode23", "dop853", "rodas", "radau9"]))
 def test_a_tolerance_acts_on_every_method(in_workspace, method):
     """In a run, in a sweep and on both sides of a comparison: a smaller tolerance takes more steps."""
     pytest.importorskip("xarray")

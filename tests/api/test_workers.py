@@ -12,7 +12,7 @@ pytest.importorskip("xarray")
 SWEEP = "harness.sweep('coulomb', {'f': [0.5, 1.0]}, stop=0.2, workers=2, folder='swept')"
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_script_without_a_main_guard_sweeps_twice_and_leaves_no_files(workspace):
     """Workers import the modules of the functions that they call, never the script."""
     (workspace / "temporary").mkdir()

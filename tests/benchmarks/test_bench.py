@@ -72,6 +72,7 @@ def of(all_measures, function):
     return [measure for measure in all_measures if measure.func is function]
 
 
+@pytest.mark.campaign
 def test_exact_events_and_the_pendulum_meet_their_targets_and_a_stuck_body_stays(all_measures):
     calls = [
         call
@@ -92,6 +93,7 @@ def test_a_missed_accuracy_target_is_reported(all_measures):
     assert 1e-4 < measure.value < 0.1
 
 
+@pytest.mark.campaign
 def test_the_own_code_is_faster_than_python_peers(all_measures):
     for call in (
         of(all_measures, time_in_process)[0],
@@ -102,6 +104,7 @@ def test_the_own_code_is_faster_than_python_peers(all_measures):
         assert 0.0 < measure.value < measure.baselines[0].value
 
 
+@pytest.mark.campaign
 def test_a_communication_step_is_timed_against_an_empty_fmu_with_the_same_outputs(all_measures, monkeypatch):
     monkeypatch.setattr(stepping_loops, "REPEATS", 2)
     measure = of(all_measures, time_communication_step)[2]()

@@ -59,6 +59,7 @@ def test_the_table_lists_every_model_and_names_missing_tools(checked):
     assert {row.importer for row in rows if row.reason} >= set(NOT_RUN)
 
 
+@pytest.mark.campaign
 def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, monkeypatch):
     """The brake has no mass m; the other models are still checked."""
     monkeypatch.setattr(table, "IMPORTERS", ())
@@ -88,6 +89,7 @@ def run(module, request):
 """
 
 
+@pytest.mark.campaign
 def test_a_crash_or_timeout_affects_only_its_own_check(make_module, monkeypatch):
     """The checks that follow run in another process; a process that ends badly loses its last answer."""
     monkeypatch.setattr(checks, "run_in_adapter", make_module("adapter_that_crashes", ADAPTER).run)

@@ -79,7 +79,7 @@ def test_an_installed_rival_simulates_a_scene_that_it_offers(references, rival):
     assert measures.steps > 10
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_our_fmus_are_exact_in_all_scenes(references, fmus, tmp_path, monkeypatch):
     (tmp_path / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):

@@ -30,7 +30,7 @@ def suite(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_archive_of_a_release_has_all_files(suite):
     files = {file.relative_to(suite.parent).as_posix() for file in suite.rglob("*") if file.is_file()}
     with ZipFile(f"{suite}.zip") as archive:

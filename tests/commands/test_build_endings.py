@@ -29,6 +29,7 @@ def started_build(folder, *options):
         yield process
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
     ("options", "line"), [((), "the build of smd starts"), (("--native",), "the C compiler starts")]
@@ -52,6 +53,7 @@ def test_standard_output_that_is_full_is_one_sentence():
     assert (done.returncode, done.stderr) == (1, "Error: No space left on device\n")
 
 
+@pytest.mark.campaign
 def test_optimized_bytecode_without_docstrings_builds_the_same_fmu(fmus, tmp_path):
     command = [sys.executable, "-OO", ROOT / "build_fmus.py", "smd", "--out", tmp_path]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)

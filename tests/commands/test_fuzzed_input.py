@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from build_cache import ROOT
 from commands import harness
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 pytestmark = pytest.mark.usefixtures("in_workspace")
 
@@ -166,14 +166,14 @@ def test_a_title_is_drawn_literally(workspace, title):
     assert (workspace / "results/mine/figure.svg").stat().st_size > 1000
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_extreme_numbers_are_drawn_or_refused(workspace):
     for values in ("x0 = 1e308", "x0 = 1e-308", "k = 1e300", "v0 = -1e300", "x0 = 5e-324\nv0 = 1e250", "m = 1e308"):
         (workspace / "mine.toml").write_text(f"{scene_text(SCENE | {'plots': PLOTS})}[values]\n{values}\n")
         check(*run_command("run", "mine.toml"), values)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_any_table_content_is_compared_or_refused(workspace):
     names = []
     for i, text in enumerate(TABLES):
@@ -219,7 +219,7 @@ def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, wo
         check(*run_command("run", "fmus/smd.fmu", option, word), word)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_randomly_mutated_scenes_run_or_are_refused(workspace):
     """The shipped scenes with a few characters changed; the same ones every time."""
     dice = random.Random(10)
@@ -282,7 +282,7 @@ FULL = "Error: No space left on device\n"
 
 @pytest.mark.parametrize(
     ("command", "shell", "status", "message"),
-    slow_after(
+    campaign_after(
         2,
         [
             (("info",), "| head -1", 0, ""),
@@ -299,7 +299,7 @@ def test_an_unwritable_standard_output_is_no_crash(workspace, command, shell, st
     assert (done.returncode, done.stderr) == (status, message)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_closed_standard_input_is_empty(user_folder, tmp_path):
     done = python(user_folder, "decay", "-", "--out", tmp_path, shell="<&-")
     assert (done.returncode, done.stderr) == (2, "Error: standard input is empty\n")
@@ -321,7 +321,7 @@ ASCII, C = {"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PY
 @pytest.mark.parametrize(
     ("command", "coding"),
     [
-        pytest.param(("decay", "swing.csv", "--no-drag"), C, marks=pytest.mark.slow),  # draws
+        pytest.param(("decay", "swing.csv", "--no-drag"), C, marks=pytest.mark.campaign),  # draws
         (("run", "mine.toml"), ASCII),
         (("sweep", "--help"), C),
     ],

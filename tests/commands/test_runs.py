@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from build_cache import ROOT, run_published_cases
 from models import MODELS, outputs
-from variants import slow_after
+from variants import campaign_after
 
 from harness import load_result
 
@@ -292,7 +292,7 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
 
 @pytest.mark.parametrize(
     "arguments",
-    slow_after(
+    campaign_after(
         2,
         [
             ["info"],
@@ -318,7 +318,7 @@ def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
     """Scenes that use more and more modules, one after the other in one process."""
     optional = ["harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps", "matplotlib"]
@@ -346,7 +346,7 @@ def test_no_temporary_fmu_files_remain_of_a_failed_run(user_folder, tmp_path):
     assert list(temporary.iterdir()) == []
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     """A slip every two seconds, up to 1e12 s; up to 1e300 s, a slip is too short beside the run."""
     done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e300, "--timeout", 0.5)
@@ -362,7 +362,7 @@ def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
 
 @pytest.mark.parametrize("words", [["--set", "m=1.5,c=0,solver.method=exact"], ["--set", "m=1.5", "--set", "c=0"]])
 @pytest.mark.parametrize(
-    "command", slow_after(1, [(("run",),), (("sweep", "--vary", "x0=0.1,0.2", "--workers", "1"),)])
+    "command", campaign_after(1, [(("run",),), (("sweep", "--vary", "x0=0.1,0.2", "--workers", "1"),)])
 )
 def test_several_assignments_stand_in_one_option(workspace, command, words):
     done = commands.harness(workspace, *command, "fmus/smd.fmu", *words, "--stop", "0.5", "--out", "out")
@@ -419,7 +419,7 @@ def test_a_scene_that_runs_too_short_for_an_analysis_names_it(workspace):
     assert load_result(workspace / "results" / "stickslip").time[-1] == 5.0
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_first_slip_without_modes_is_named_as_what_is_measured(workspace):
     """A sled that creeps breaks away at no time; it becomes as fast as the driver later than a stick ends."""
     texts = [harness(workspace, "run", name, "--stop", 9).stdout for name in ("stickslip", "pacejka-0.001")]

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from build_cache import ROOT
 from models import MODELS
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 from fmus.compiler.model_lookup import more_model_names
 from harness import HarnessError, PrecisionResult
@@ -118,7 +118,9 @@ def test_a_command_without_its_fmus_explains_how_to_build_them(tmp_path, monkeyp
         commands.main(arguments.split(), standalone_mode=False)
 
 
-@pytest.mark.parametrize("arguments", slow_after(1, [(("run",),), (("sweep", "--vary", "k=1,2", "--workers", "1"),)]))
+@pytest.mark.parametrize(
+    "arguments", campaign_after(1, [(("run",),), (("sweep", "--vary", "k=1,2", "--workers", "1"),)])
+)
 def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_path, arguments):
     """A native FMU also prints it to the standard error of the process, bypassing Python."""
     done = harness(tmp_path, *arguments, backend_fmus / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")

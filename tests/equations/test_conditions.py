@@ -12,7 +12,7 @@ from model_text import remove_unused
 from models import DOP853, ODE23, ODE45, RODAS, scalar_class
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
-from variants import slow_after
+from variants import campaign_after, slow_after
 from worker_client import FmiError, FmpyError
 
 from fmus.compiler.model_lookup import find_model
@@ -183,7 +183,7 @@ def piecewise_solution(name):
 
 @pytest.mark.parametrize(
     "name",
-    slow_after(1, ["nested", "domain", *(name for name in PIECES if name not in ("nested", "domain"))]),
+    campaign_after(1, ["nested", "domain", *(name for name in PIECES if name not in ("nested", "domain"))]),
 )
 def test_the_error_is_proportional_to_the_tolerance(launch, name):
     """Each method, with jumps and kinks of the force, nested conditions, and operations with a limited domain."""
@@ -196,7 +196,7 @@ def test_the_error_is_proportional_to_the_tolerance(launch, name):
             assert abs(fmu.get("x") - x) < 30.0 * rtol
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_changes_are_located_to_rounding(launch):
     """Parabolas, which all methods follow exactly, at a loose tolerance: a relay with 800 changes, a force that sets in
     at a time, two conditions at the same instant."""
@@ -268,7 +268,7 @@ def test_equality_counts_as_the_comparison_says(launch):
 # ---- inputs
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_conditions_on_inputs_follow_jumps_at_communication_points(launch):
     """Closed form; python and native."""
     for kind in ("", "native"):
@@ -281,7 +281,7 @@ def test_conditions_on_inputs_follow_jumps_at_communication_points(launch):
         assert abs(fmu.get("x") - sum(0.25 * (a + b) for a, b in pairwise(speeds))) < 1e-14
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_conditions_on_inputs_with_derivatives_change_within_steps(launch):
     """F_ext = 5 N/s t exceeds 1 N at 0.2 s; then the force is constant."""
     fmu = launch("ramped", "native", k=0.0, x0=0.0, rtol=1e-4)
@@ -295,7 +295,10 @@ def test_conditions_on_inputs_with_derivatives_change_within_steps(launch):
 
 @pytest.mark.parametrize(
     "name",
-    ["nested", *(pytest.param(name, marks=pytest.mark.slow) for name in ("backlash", "switched", "lifting", "domain"))],
+    [
+        "nested",
+        *(pytest.param(name, marks=pytest.mark.campaign) for name in ("backlash", "switched", "lifting", "domain")),
+    ],
 )
 def test_results_do_not_depend_on_backend_and_communication_steps(launch, name):
     """Bit for bit, with a parameter changed within a step, and a state restored in mid-step and at an event."""
@@ -374,7 +377,7 @@ def test_a_sliding_force_that_becomes_negative_ends_the_run(launch, kind):
     assert fmu.messages()[-1][2].startswith(NEGATIVE.format(1.0, -0.5))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @EVERY_KIND
 def test_a_sliding_force_that_becomes_negative_by_the_motion_ends_the_run(launch, kind):
     """By the position and by the time."""
@@ -530,7 +533,7 @@ def test_the_indicator_of_a_condition_has_its_unit(tmp_path, condition, unit):
     assert scalar_class(tmp_path / "unit.py").condition_units == (unit, "N")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("name", "kind"), [("relay", "native"), ("backlash", "native"), ("backlash", "native/fmi3"), ("timed", "native")]
 )
@@ -547,7 +550,7 @@ def test_the_solver_of_an_importer_locates_the_changes(worker, built, name, kind
         assert abs(columns["x"][-1] - x) < 100.0 * rtol
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", ["native", pytest.param("native/fmi3", marks=pytest.mark.campaign)])
 def test_model_exchange_refuses_what_co_simulation_refuses(worker, built, kind):
     """Chattering, negative sliding forces, and sliding forces above the holding force at rest."""

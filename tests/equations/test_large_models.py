@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 from models import scalar_class
-from variants import slow_after
+from variants import campaign_after
 
 from fmus.compiler import BuildError
 from fmus.compiler.equations.model_file import load_model_file
@@ -84,7 +84,7 @@ def shallow_stack(depth):
     sys.setrecursionlimit(limit)
 
 
-@pytest.mark.parametrize("shape", slow_after(3, SHAPES))
+@pytest.mark.parametrize("shape", campaign_after(3, SHAPES))
 def test_work_grows_no_faster_than_n_log_n(tmp_path, shape):
     """Work that does not depend on n is subtracted by differences: w(4n) - w(2n) over w(2n) - w(n)."""
     work = []
@@ -95,7 +95,7 @@ def test_work_grows_no_faster_than_n_log_n(tmp_path, shape):
     assert (work[2] - work[1]) / (work[1] - work[0]) < limit
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_lowering_and_translation_grow_no_faster_than_n_log_n(tmp_path):
     """The first translation of a process fills caches, and is not counted."""
     work = []
@@ -112,7 +112,7 @@ def test_lowering_and_translation_grow_no_faster_than_n_log_n(tmp_path):
     assert (work[3] - work[2]) / (work[2] - work[1]) < limit
 
 
-@pytest.mark.parametrize("shape", slow_after(1, ["sum", "nested function", "shared cases"]))
+@pytest.mark.parametrize("shape", campaign_after(1, ["sum", "nested function", "shared cases"]))
 def test_equations_deeper_than_the_stack_of_python_build(tmp_path, shape):
     """The rate has the value that Python calculates; all conditions of a new model object hold."""
     n = 350

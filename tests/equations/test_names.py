@@ -8,7 +8,7 @@ import pytest
 from build_cache import build_user_model
 from models import scalar_class
 from native_fmus import require_compiler
-from variants import slow_after
+from variants import campaign_after
 
 import fmus
 import harness
@@ -96,7 +96,7 @@ def refusal(name, role, body, folder):
     return ""
 
 
-@pytest.mark.parametrize("body", slow_after(1, [ALONE, TOGETHER]))
+@pytest.mark.parametrize("body", campaign_after(1, [ALONE, TOGETHER]))
 def test_an_attribute_of_a_generated_class_is_no_name_of_a_variable(body, tmp_path):
     """But the names of constants, as limit or A_F_F, are those that no variable has."""
     attributes, _ = used_names(body, tmp_path)
@@ -107,7 +107,7 @@ def test_an_attribute_of_a_generated_class_is_no_name_of_a_variable(body, tmp_pa
     assert {"rates", "stop_time", "condition_texts", "inconsistent_input"} <= {*attributes} - accepted
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("backend", "turn"),
     [("", 0), *(pytest.param(*case, marks=pytest.mark.campaign) for case in OTHER_CASES)],

@@ -176,7 +176,7 @@ def test_values_are_those_of_numpy_and_scipy_in_each_kind_of_fmu(worker, tmp_pat
 # ---- motions
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_error_is_proportional_to_the_tolerance(worker, tmp_path, kind):
     """Each method, against a solution from one point of the tables to the next: position and changes of the mode."""
@@ -325,7 +325,7 @@ def tunable_fmus(tmp_path_factory):
     return {kind: build_user_model(folder / "bench.py", *KINDS[kind]) / kind / "bench.fmu" for kind in KINDS}
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_values_of_a_table_have_structured_names(tunable_fmus):
     """Each kind is valid by the schema and fmpy, with a scalar for each value."""
     for path in tunable_fmus.values():

@@ -14,7 +14,7 @@ from model_text import BLOCK, PULSES
 from models import EXAMPLE_MODELS, model_class
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
-from variants import slow_after
+from variants import campaign_after, slow_after
 from worker_client import FmiError
 
 from fmus.compiler import BuildError
@@ -44,7 +44,7 @@ def built(path, kind):
     return folder / kind / f"{path.stem}.fmu"
 
 
-@pytest.mark.parametrize("kind", slow_after(2, KINDS))
+@pytest.mark.parametrize("kind", campaign_after(2, KINDS))
 def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(kind):
     (path,) = (path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     fmu = built(path, kind)
@@ -184,7 +184,7 @@ def test_files_of_the_same_stem_are_packed_and_no_others(oil):
     assert "Certified result of the default experiment: series and DOP853, relative difference 1e-13." in page
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_model_file_may_be_named_like_a_python_module(oil):
     """For example math.py or fmus.py: the commands do not import them instead of the module."""
     folder = oil / "Modelle für später"
@@ -411,7 +411,7 @@ class Texts(Model):
 """
 
 
-@pytest.mark.parametrize("kind", slow_after(1, KINDS))
+@pytest.mark.parametrize("kind", campaign_after(1, KINDS))
 def test_any_printable_text_survives_in_every_backend(kind, tmp_path, worker):
     """Trigraphs, delimiters and format fields of C, XML and Python; in descriptions and messages."""
     (tmp_path / "texts.py").write_text(TEXTS, encoding="utf-8")

@@ -46,7 +46,7 @@ def couple(folder, monkeypatch):
     return module.couple
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_two_equal_masses_converge_to_their_closed_form_in_proportion_to_the_step(couple):
     """From x and -x both have the stiffness k + 2 k_spring."""
     errors = []
@@ -65,7 +65,7 @@ def test_two_equal_masses_converge_to_their_closed_form_in_proportion_to_the_ste
     assert errors[1] < 5e-3
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("tool", ["libcosim", "ecos", "omsimulator"])
 def test_another_tool_gives_the_motion_of_the_page(folder, tool):
     if not find_spec({"libcosim": "libcosimpy", "ecos": "ecospy", "omsimulator": "OMSimulator"}[tool]):
@@ -77,7 +77,7 @@ def test_another_tool_gives_the_motion_of_the_page(folder, tool):
     assert done.stdout.splitlines()[-2:] == ["left.x 0.01141", "right.x -0.00802"]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_belt_carries_a_block_of_another_fmu(couple, folder):
     """Position, speed and acceleration are connected; the reference is scipy with events."""
     for name in ("belt.py", "block.py"):
@@ -101,7 +101,7 @@ def test_a_belt_carries_a_block_of_another_fmu(couple, folder):
     assert np.abs(np.array(rows)[:, 0] - expected).max() < 6e-4
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_controller_of_another_fmu_lets_the_axis_hunt(couple, folder):
     """It sticks where the axis with the same gains in one model sticks; both overshoot the set point in turn."""
     link(folder, folder / "controller.py")

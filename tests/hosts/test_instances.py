@@ -45,6 +45,7 @@ def built(backend, fmus):
     return fmus_of(backend, fmus)
 
 
+@pytest.mark.campaign
 def test_hundreds_of_life_cycles_leave_little_memory(built, record_property):
     """Measured: 2 kB per life cycle in Python, 0.2 kB in FMI 3.0, and no additions to sys.path."""
     result = run_script("run_in_turn", built, 150)
@@ -55,6 +56,7 @@ def test_hundreds_of_life_cycles_leave_little_memory(built, record_property):
     assert late - early < 135 * 4.0
 
 
+@pytest.mark.campaign
 def test_an_fmu_unpacked_for_every_run_is_released(built, record_property):
     """Memory and libraries of earlier runs are released, as with simulate_fmu of fmpy."""
     result = run_script("unpack_for_every_run", built[-1], 30)
@@ -65,6 +67,7 @@ def test_an_fmu_unpacked_for_every_run_is_released(built, record_property):
     assert late - early < 27 * 20.0
 
 
+@pytest.mark.campaign
 def test_hundreds_of_instances_of_both_versions_of_fmi_coexist_in_one_process(fmus, record_property):
     """All instances exist at once and are stepped in turn, then in threads."""
     built = fmus_of("fmi3", fmus) + fmus_of("python", fmus)  # tests/native/test_c_host.py has native ones
@@ -75,6 +78,7 @@ def test_hundreds_of_instances_of_both_versions_of_fmi_coexist_in_one_process(fm
     assert run_script("run_in_threads", built, 8, 2) == {"runs": [1] * len(built), "errors": []}
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_child_processes_continue_instances_and_create_new_ones(backend, fmus, method):
     """One smooth model and one with a mode are enough for processes."""
@@ -82,6 +86,7 @@ def test_child_processes_continue_instances_and_create_new_ones(backend, fmus, m
     assert (result["same"], {*result["codes"]}) == (True, {0})
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("backend", ["python"])  # the others load no Python
 def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(built):
     result = run_script("run_beside_sources", str(ROOT), built)

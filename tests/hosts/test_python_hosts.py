@@ -108,7 +108,7 @@ def requests(fmus, tmp_path_factory):
     return collected
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("version", [PYTHONS[0], PYTHONS[-1]])
 def test_the_embedded_code_behaves_alike_on_the_oldest_and_newest_python(requests, version):
     """The other tests use a version in between."""

@@ -239,6 +239,7 @@ class RandomCalls(RuleBasedStateMachine):
         separate.free()
 
 
+@pytest.mark.campaign
 def test_no_call_sequence_crashes_or_fails_silently(fmus):
     machine = type("Machine", (RandomCalls,), {"folder": fmus})
     run_state_machine_as_test(machine, settings=SHORT)

@@ -60,7 +60,7 @@ def numbers(path, model, names):
     return results
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("text", NAMES, ids=["sled", "belt"])
 def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
     default_names, path = ("POSITION", "SPEED", "RATE", "MODE"), tmp_path / "mine.py"
@@ -107,7 +107,7 @@ def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
     assert rates[0] == rates[1]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_event_indicators_of_a_native_fmu_do_not_depend_on_names(tmp_path, worker):
     """Two blocks, one of whose positions is named like a step size of the numerics."""
     (blocks,) = (path for path in LARGER_MODELS if path.stem == "stacked")

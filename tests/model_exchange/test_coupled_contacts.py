@@ -9,7 +9,7 @@ from internal_steps import components, prepared_run, start
 from models import DOP853, LARGER_MODELS
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 from fmus.compiler.lowering import lowered_model, model_exchange_run, sibling_module
@@ -80,7 +80,7 @@ def test_modes_follow_at_the_events_located_by_an_importer(name):
     assert np.abs(np.array(final)[: len(end)] - end).max() < 1e-6
 
 
-@pytest.mark.parametrize(("name", "push"), slow_after(1, [("sleds", 12.0), ("sleds", 0.0), ("stacked", 0.0)]))
+@pytest.mark.parametrize(("name", "push"), campaign_after(1, [("sleds", 12.0), ("sleds", 0.0), ("stacked", 0.0)]))
 def test_coupled_bodies_stick_under_fixed_steps(name, push):
     """A slip is far beyond zero when a fixed step notices it; the events are those of co-simulation all the same."""
     require_compiler()

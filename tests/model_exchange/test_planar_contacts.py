@@ -9,7 +9,7 @@ import mpmath
 import pytest
 from build_cache import build_once, build_user_model
 from native_fmus import require_compiler
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 from benchmarks.campaigns import planar_contacts
@@ -57,7 +57,7 @@ def puck(request):
     return build_once(f"puck-{request.param}", "puck", *KINDS[request.param], *PLATFORM) / "puck.fmu"
 
 
-@pytest.mark.parametrize(("F", "phi"), slow_after(2, SCENES))
+@pytest.mark.parametrize(("F", "phi"), campaign_after(2, SCENES))
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
 def test_cvode_brings_a_body_to_rest_as_the_closed_form_says(puck, F, phi, rtol):
     assert max(planar_contacts.exchange_errors(puck, 1.0, F, 2.0, 1.0, phi, rtol=rtol)) < 100.0
@@ -73,7 +73,7 @@ def test_a_body_rests_under_fixed_steps(puck, h):
     assert (end["x"], end["y"]) == pytest.approx((truth["x"][-1], truth["y"][-1]), abs=2.0 * h)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_cvode_brings_random_motions_to_rest_as_the_closed_form_says(puck):
     for scene in planar_contacts.random_scenes(20):
         for rtol in (1e-4, 1e-8):
@@ -110,7 +110,7 @@ def test_a_body_holds_up_to_a_circle_and_leaves_along_its_load(puck, degrees):
         assert end["x"] * cos(angle) + end["y"] * sin(angle) == pytest.approx(hypot(end["x"], end["y"]), rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_body_leaves_under_a_load_that_turns_where_holding_and_sliding_friction_are_equal(tmp_path):
     """Its slip begins without acceleration."""
     require_compiler()
@@ -126,7 +126,7 @@ def test_a_body_leaves_under_a_load_that_turns_where_holding_and_sliding_frictio
             assert len(run.events.t) > 0
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 def test_cvode_follows_springs_circles_and_jumps_as_co_simulation_does(rtol, tmp_path):
     require_compiler()
@@ -152,7 +152,7 @@ def test_derivatives_of_the_time_of_rest_are_those_of_the_closed_form(puck, F_x,
         assert run["v_x", name][-1] == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [18, 27])
 def test_derivatives_through_stick_and_slip_are_those_of_differences(seed, tmp_path):
     require_compiler()
@@ -180,7 +180,7 @@ def pair(tmp_path_factory):
     return next(build_user_model(file, "--native", *PLATFORM).rglob("pair.fmu"))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_derivatives_of_two_bodies_are_those_of_differences_and_turn_with_the_plane(pair):
     """The second body never leaves the line of its spring, and the first one passes zero on it, where it turns back."""
     values, outputs = {"f": 2.0, "k": 30.0, "c": 0.3, "v_x0": 1.0}, ["x", "y", "z_x", "z_y"]

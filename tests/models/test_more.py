@@ -68,7 +68,7 @@ def test_a_model_has_an_icon_and_a_certified_result_from_two_formulations(name):
     assert load_reference(name, MORE).estimated_error < 1e-10
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "kind"), EVERY_KIND)
 def test_fmpy_validates_each_kind(name, kind):
     assert validate_fmu(str(built(name, kind))) == []

@@ -12,7 +12,7 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from native_fmus import require_compiler
 from prescribed_motion import BLOCK, belt_rising, belt_shaking, solve_block
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 from fmus.compiler import BuildError
@@ -197,7 +197,7 @@ TABLE = {"time": (times := np.linspace(0.0, 5.0, 11))} | dict(
 
 
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange", "whole runs of a fit"])
-@pytest.mark.parametrize("backend", slow_after(1, BACKENDS))
+@pytest.mark.parametrize("backend", campaign_after(1, BACKENDS))
 def test_a_table_with_the_rates_drives_the_block_as_the_belt_does(backend, interface):
     """The inputs are continued from the start of a step: set to their means, the belt would jump at each step."""
     if (backend, interface) == ("python", "ModelExchange"):
@@ -234,7 +234,7 @@ def test_a_kink_with_one_row_is_an_event_as_one_with_two_rows(at_kink):
     assert run.statistics.evaluations < 1.05 * expected.statistics.evaluations
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("count", "noise"), [(1000, 1e-3), (5, 0.0), (40, 0.1)])
 def test_a_smooth_or_noisy_table_has_no_kinks(count, noise):
     t = np.linspace(0.0, 4.0, count)
@@ -298,7 +298,7 @@ def test_fmpy_runs_model_exchange_with_a_rising_speed(worker, kind):
     assert columns["events.count"][-1] == 2
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_errors_of_the_importers_solver_are_no_jump(worker):
     """An event of another contact leaves a stuck contact alone, although the state has drifted from the belt."""
     fmu = worker.exchange(build(TWO, "native/fmi3", "two")).begin({"v_belt": 1.0})
@@ -356,7 +356,7 @@ TWO_WITH_BELT = (
 SPEEDS = ((0.0, 4.0), (0.5, -6.0), (1.5, 6.0), (2.5, -4.0))  # time and acceleration of the belt from then on
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
 def test_two_contacts_agree_with_the_belt_as_a_state_of_the_same_model(worker, backend):
     """Only the acceleration is set, four times; both FMUs then have the same motion between communication points."""
@@ -400,7 +400,7 @@ class Crank(Model):
 '''
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_positions_in_a_slip_and_rates_that_are_expressions_are_continued(worker):
     """The crank speeds up; the inputs are set once, at the start. The second solution is scipy with events."""
     motor, r, gear = 2.0, 0.3, 0.5
@@ -463,7 +463,7 @@ def test_a_load_follows_a_position_with_its_speed_and_acceleration(worker, backe
     fmu.free()
 
 
-@pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
+@pytest.mark.parametrize("backend", campaign_after(1, ["python", "native"]))
 def test_the_closed_form_continues_a_load_by_its_rate(worker, backend):
     """The end of the spring moves as 0.05 t m; methods with steps agree with the closed form."""
     a_end = '    a_end = Input(0.0, "m/s2", "acceleration of the end of the spring")\n'

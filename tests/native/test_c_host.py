@@ -192,7 +192,7 @@ def failures(name):
     return script
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("sanitizers", "n_instances"), [(SANITIZERS, 25), ("thread", 1)])
 @pytest.mark.parametrize("name", ["pacejka", "stickslip"])
 def test_the_sanitizers_report_nothing(name, sanitizers, n_instances):

@@ -146,6 +146,7 @@ def test_only_required_code_is_compiled():
     assert "LinearClosedForm" not in text
 
 
+@pytest.mark.campaign
 def test_methods_and_laws_can_be_selected_as_for_the_python_fmu(tmp_path):
     build_native_fmus()
     chosen = ("stickslip", "--method", "exact", "--law", "hybrid", "--platform", "linux64")
@@ -246,6 +247,7 @@ def test_without_a_platform_the_usual_three_are_built():
     assert DEFAULT_PLATFORMS == ("linux64", "win64", "darwin64")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("platform", ["linux64", "x86_64-linux"])
 def test_fmpy_and_cmake_compile_the_sources_to_the_same_results(tmp_path, platform):
     """Of both versions of FMI, whose layers are the same for every model; one model has no contact."""
@@ -261,6 +263,7 @@ def test_fmpy_and_cmake_compile_the_sources_to_the_same_results(tmp_path, platfo
     )
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", MODELS)
 def test_any_compiler_builds_the_sources_to_the_same_results(tmp_path, name):
     """The system's compiler, with no options except for a shared library."""

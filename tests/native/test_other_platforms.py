@@ -156,6 +156,7 @@ def tables(answers):
     return [list(zip(*rows[k : k + ROWS], strict=True)) for k in range(0, len(rows), ROWS)]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", STICKSLIP_IN_CI)
 def test_results_agree_with_linux_on_x86(machine, name):
     script = runs(name)

@@ -89,6 +89,7 @@ class Draw:
         return "\n".join([f"    def {name}(self, x, y):", *body, f"        return {self.number(2)}, i", ""])
 
 
+@pytest.mark.campaign
 def test_random_programs_behave_as_in_python(tmp_path):
     names = [f"random_{seed}" for seed in range(48)]
     text = "import math\n"

@@ -47,6 +47,7 @@ def walk(request):
     return program("fmi3_stress.c", fmi3_fixtures.build_fmi3_fmus() / f"{request.param}.fmu")
 
 
+@pytest.mark.campaign
 def test_a_corrupted_state_is_refused_and_no_instance_changes(abuse):
     output, stderr = abuse("flip_bits")
     assert int(output) > STATES / len(MODELS)
@@ -61,6 +62,7 @@ def test_random_calls_end_in_a_status_and_leave_other_instances_alone(abuse):
     abuse("random_calls", 1, 20_000)
 
 
+@pytest.mark.campaign
 def test_every_fmi3_function_in_every_state_follows_the_standard_without_leaks(walk):
     """With null pointers and wrong lengths, in every kind of instance; the address sanitizer detects leaks."""
     output, _ = walk("states", 1)
@@ -115,6 +117,7 @@ def test_valid_fmi3_calls_with_any_values_keep_parameters_times_and_finite_value
     assert int(steps) > 5 * runs
 
 
+@pytest.mark.campaign
 def test_fmi3_instances_share_nothing_between_threads():
     program("fmi3_stress.c", fmi3_fixtures.build_fmi3_fmus() / "stickslip.fmu", "thread")("states", 4)
 

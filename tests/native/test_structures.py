@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from model_text import remove_unused
-from variants import slow_after
+from variants import campaign_after
 
 from fmus.compiler.lowering import lowered_model
 from fmus.compiler.lowering.feature_selection import select_features
@@ -53,7 +53,7 @@ PAIRS = {  # pairs of slip and law with pairs of spring and sliding force, so th
 }
 
 
-@pytest.mark.parametrize(("slip", "laws"), slow_after(1, PAIRS))
+@pytest.mark.parametrize(("slip", "laws"), campaign_after(1, PAIRS))
 def test_every_structure_translates_to_c(tmp_path, slip, laws):
     """Otherwise the build refuses the model: some conditions are known when a model is built, others in a run only."""
     speed, table_force = SLIPS[slip]

@@ -119,7 +119,7 @@ def test_a_hang_is_killed_and_another_process_goes_on(worker):
     assert worker.call(abs, -1) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_progress_report_renews_the_time_limit(worker, functions, monkeypatch):
     """The clock of this process is the number of reports: a second passes with each."""
     reports = []

@@ -35,6 +35,7 @@ def hold_and_release(fmu):
     return loaded, fmu.get("x")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", HYBRID)
 def test_a_hybrid_law_holds_a_load_below_the_limit_for_ever(worker, fmus, more, name):
     folder = fmus if name == "stickslip" else more

@@ -88,7 +88,7 @@ def held_below(eps, stop):
         go(1, LinearSegment(sled, pull(t, x) - sled.slide, v), lambda t, x, v: v <= eps, "1e-3")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_threshold_reference_is_the_double_nearest_to_its_segments():
     truth = load_reference("stickslip-threshold")
     pieces = held_below(mpf(1e-7), 16)
@@ -212,7 +212,7 @@ class Pulses(event_located.HybridProblem):
             y[2] = 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_pulse_that_the_steps_of_scipy_pass_is_not_certified():
     """There are three pulses, with two events each."""
     problem = Pulses()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 from models import MODELS
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 from harness import HarnessError, load_result, simulate
 from harness.results.folder import replace_folder
@@ -175,7 +175,7 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
 
 @pytest.mark.parametrize(
     ("arguments", "older", "newer", "had"),
-    slow_after(
+    campaign_after(
         2,
         [
             (("run", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),

@@ -66,7 +66,7 @@ def follow(cls, values, duration, most):
     return status, step.t1, step.n_accepted
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("method", slow_after(2, METHODS))
 def test_a_block_that_two_belts_push_to_their_edge_ends_the_run(build, method):
     """Its swings shrink, and their number grows without limit."""

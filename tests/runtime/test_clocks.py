@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from internal_steps import compute_step, prepared_run, start
 from models import DOP853, ODE23, ODE45, RODAS
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 from fmus.compiler.lowering import lowered_model
 
@@ -101,7 +101,7 @@ def test_no_dip_of_a_limit_is_missed(held, method, rtol, p):
         assert count_dips(held, {"solver.method": method, "solver.rtol": rtol, "solver.h_max": h_max, "p": p}) == 13
 
 
-@pytest.mark.parametrize("clock", slow_after(1, OTHER_CLOCKS))
+@pytest.mark.parametrize("clock", campaign_after(1, OTHER_CLOCKS))
 def test_no_dip_over_a_clock_whose_rate_is_known_at_rest_is_missed(clock, tmp_path):
     cls = lower(tmp_path, OTHER_CLOCKS[clock], DIPS["gaussian"])
     for method in (ODE23, DOP853, RODAS):

@@ -202,7 +202,7 @@ def test_a_block_slides_where_the_speed_of_its_belt_jumps(custom_model, belt, se
         assert y[-1] == pytest.approx(v, abs=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_order_of_declaration_does_not_matter(custom_model):
     """Three stacked blocks, driven from both sides: at first all contacts carry the same load and have the same
     limit."""
@@ -370,7 +370,7 @@ def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
     assert n_choices > 10
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("free", slow_after(1, "123"))
 def test_a_contact_without_friction_is_no_contact(custom_model, free):
     """The run is that of a model without it; it makes no events."""
@@ -435,7 +435,7 @@ def test_friction_may_vanish_and_return_in_a_run(custom_model, method):
     [
         (DOP853, 1e-12),
         *(
-            pytest.param(method, rtol, marks=pytest.mark.slow)
+            pytest.param(method, rtol, marks=pytest.mark.campaign)
             for method, rtol in ((ODE23, 1e-6), (ODE45, 1e-6), (ODE45, 1e-12), (DOP853, 1e-6), (RODAS, 1e-6))
         ),
     ],

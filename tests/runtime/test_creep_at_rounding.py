@@ -38,7 +38,7 @@ FRICTION = {  # declaration and sliding force
 }
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", FRICTION)
 def test_slips_within_the_tolerance_take_few_steps(tmp_path, kind):
     """The load equals the friction but for rounding errors, or slips are too slow for the error control to see."""

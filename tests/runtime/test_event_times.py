@@ -4,7 +4,7 @@ from math import ulp
 
 import pytest
 from mpmath import atan2, cos, mpf, pi, sign, sqrt, workdps
-from variants import slow_after
+from variants import campaign_after
 
 DIGITS = 50
 PLACES = 4  # units in the last place of the time
@@ -30,7 +30,7 @@ SWINGS = [  # covers every pair of friction, values and backend
 ]
 
 
-@pytest.mark.parametrize(("f", "values", "backend_fmus"), slow_after(2, SWINGS), indirect=["backend_fmus"], ids=str)
+@pytest.mark.parametrize(("f", "values", "backend_fmus"), campaign_after(2, SWINGS), indirect=["backend_fmus"], ids=str)
 def test_half_cycles_of_a_mass_with_little_friction_end_on_time(worker, backend_fmus, f, values):
     """Each lasts half a period and loses 2 f/k."""
     with workdps(DIGITS):
@@ -61,7 +61,7 @@ RUNS = [  # covers every pair of sled, start and backend
 ]
 
 
-@pytest.mark.parametrize(("sled", "start", "backend_fmus"), slow_after(2, RUNS), indirect=["backend_fmus"])
+@pytest.mark.parametrize(("sled", "start", "backend_fmus"), campaign_after(2, RUNS), indirect=["backend_fmus"])
 def test_slips_of_the_sled_end_on_time(worker, backend_fmus, sled, start):
     """It sticks while the spring is stretched from d - (h - d) to h, and slips through the angle 2 (pi - phi) with
     tan(phi) = w (h - d)/u, where h and d are the stretches at the static limit and at sliding friction.

@@ -129,7 +129,7 @@ def test_the_closed_form_is_right_to_rounding(draw_motion, seed):
             assert error <= ROUNDING * scale, (start, s)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("draw_motion", [draw_start, draw_decay])
 def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
@@ -198,7 +198,7 @@ def test_a_body_with_a_contact_agrees_for_every_sign_of_stiffness_and_damping(wo
         body.free()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_solves_every_sign_of_stiffness_and_damping(worker, method):
     for k, c in SIGNS:
@@ -260,7 +260,7 @@ def test_a_force_with_derivatives_acts_on_a_growing_motion(worker):
             body.free()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_driver_pulls_a_body_by_a_negative_stiffness(worker, tmp_path):
     """The sled of the shipped model; the driver moves its unstable equilibrium."""
     source = (ROOT / "fmus" / "stickslip.py").read_text()
@@ -280,7 +280,7 @@ def test_a_driver_pulls_a_body_by_a_negative_stiffness(worker, tmp_path):
         body.free()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_references_and_stability_accept_an_unstable_model(tmp_path):
     path = fmu("python").with_suffix(".py")
     file = tmp_path / path.name

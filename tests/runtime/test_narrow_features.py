@@ -10,7 +10,7 @@ import pytest
 from build_cache import build_user_model
 from models import DOP853, ODE23, ODE45, RODAS
 from scipy.integrate import solve_ivp
-from variants import slow_after
+from variants import campaign_after
 
 # Reference motions of a block on a belt whose friction has a narrow peak at zero slip, by scipy.
 NEAR = 7.0  # widths; the peak is below the rounding error beyond
@@ -178,15 +178,15 @@ def assert_resolved(worker, folder, model, blocks):
     fmu.free()
 
 
-@pytest.mark.parametrize("v_s", slow_after(1, [1e-3, 1e-2, 1e-4]))
+@pytest.mark.parametrize("v_s", campaign_after(1, [1e-3, 1e-2, 1e-4]))
 @pytest.mark.parametrize(
-    ("model", "v_b", "x0"), slow_after(1, [("belt", 0.1, 0.0), ("belt", 0.0, 0.3), ("floor", 0.0, 0.3)])
+    ("model", "v_b", "x0"), campaign_after(1, [("belt", 0.1, 0.0), ("belt", 0.0, 0.3), ("floor", 0.0, 0.3)])
 )
 def test_a_peak_of_any_width_is_resolved(worker, tmp_path, model, v_b, x0, v_s):
     assert_resolved(worker, tmp_path, model, [(v_b, v_s, x0)])
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("model", ["two_widths", "other_state"])
 def test_the_smallest_width_counts_for_every_slip(worker, tmp_path, model):
     """Of whatever state it is declared, and whatever contact it belongs to."""

@@ -7,7 +7,7 @@ import independent_solution
 import pytest
 from independent_solution import ClosedFormMotion
 from models import EXACT, HYBRID, ODE23, SIGN, THRESHOLD
-from variants import slow_after
+from variants import campaign_after
 
 MATLAB = {"solver.method": ODE23, "solver.rtol": 1e-3, "solver.atol": 1e-6}
 
@@ -63,7 +63,7 @@ def test_the_threshold_law_chatters_and_shows_the_published_slips(launch):
     assert max(a for v, a in rows if v > 0.01) == pytest.approx(2.95, abs=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_steps_of_the_threshold_law_depend_on_the_last_digits_of_a_parameter(launch):
     """This is why they differ from the published 10972, as the scene says."""
     counts = []
@@ -105,7 +105,7 @@ def test_counters_count_the_work_done(launch):
         assert 0 <= evaluations - 3 * (steps + rejected) <= 2
 
 
-@pytest.mark.parametrize("load", slow_after(1, [2, 1]), ids=["reaction", "weight"])
+@pytest.mark.parametrize("load", campaign_after(1, [2, 1]), ids=["reaction", "weight"])
 def test_the_pendulum_agrees_with_its_independent_solution(launch, load):
     cases = [
         ({}, independent_pendulum.THETA0, 0.0, 1e-7),

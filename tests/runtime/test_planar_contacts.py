@@ -114,7 +114,7 @@ def test_body_comes_to_rest_as_the_closed_form_says(shipped, F, phi):
     assert max(errors_at_rest(shipped, 1.0, F, 2.0, 1.0, phi)) < 1e-10
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_random_motions_come_to_rest_as_the_closed_form_says(shipped):
     for scene in random_scenes(40):
         assert max(errors_at_rest(shipped, *scene)) < 1e-9, scene
@@ -179,7 +179,7 @@ def test_body_rests_on_a_belt_as_on_a_plate(shipped, v_belt):
     assert (belt["v_x"][-1], belt["v_y"][-1]) == (v_belt, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_body_on_a_belt_moves_as_on_a_table_that_stands_still(puck, build):
     belt = '    v_b = Input(0.0, "m/s", "speed of the belt", rate=0.0)\n'
     moving = build("carried", *NATIVE, slip="(v_x - v_b, v_y)", belt=belt, more=BLOCK)
@@ -192,7 +192,7 @@ def test_body_on_a_belt_moves_as_on_a_table_that_stands_still(puck, build):
     assert on_table.events.t[-1] == pytest.approx(run.events.t[np.array(run.events.modes["R"]) == 0][0], abs=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_two_bodies_in_a_plane_and_a_block_move_as_they_do_alone(puck, build):
     """Without the spring between them they are independent; with it, CVode is the second route."""
     several = build("several", *NATIVE, more=SECOND + BLOCK)
@@ -222,7 +222,7 @@ def test_two_bodies_in_a_plane_and_a_block_move_as_they_do_alone(puck, build):
     assert len(run.events.t[run.events.t > 0.0]) == other["events.count"] > 3
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_python_and_native_fmus_have_the_same_bits(puck, build):
     python = build("puck")
     start, force = {"k": 90.0, "f_s": 2.5, "v_y0": 1.0}, constant(4.0, 1.0, 3.0)
@@ -265,7 +265,7 @@ def solve_pulled(m, k, f, hold, r, speed, stop):
         events.append(t)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_pulled_body_sticks_and_slips_as_scipy_says(build):
     require_compiler()
     driver = """    pull = Parameter(0.1, "m/s", "speed of the driver")

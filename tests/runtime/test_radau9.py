@@ -238,7 +238,7 @@ def test_radau9_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
 # ---- friction with a kink
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_kink_of_the_rates_costs_less_than_ten_tolerances():
     """LuGre, three stops and restarts; the reference is an explicit method of order 8.
 

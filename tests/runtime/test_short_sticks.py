@@ -635,6 +635,7 @@ def wrong_sets(worker, path, model, method, rtol):
     return wrong
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("rtol", [1e-6, pytest.param(1e-11, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(
     ("model", "method"),

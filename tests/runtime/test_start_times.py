@@ -8,7 +8,7 @@ import pytest
 from build_cache import build_once
 from models import scalar_class
 from native_fmus import require_compiler
-from variants import slow_after
+from variants import campaign_after, slow_after
 from worker_client import FmiError
 
 STARTS = (1.0, 1e6, -1e3)
@@ -34,7 +34,7 @@ def follow_events(fmu, start, stop, modes):
     return [after[1:] for before, after in pairwise(rows) if after[0] != before[0]]
 
 
-@pytest.mark.parametrize("name", slow_after(2, ["joint", "belt", "clutch", "forced", "sleds", "stacked"]))
+@pytest.mark.parametrize("name", campaign_after(2, ["joint", "belt", "clutch", "forced", "sleds", "stacked"]))
 def test_events_are_the_same_from_any_start_time(worker, name, kind):
     model = scalar_class(name)
     modes = [*model().contacts]

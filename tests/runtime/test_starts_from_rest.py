@@ -5,7 +5,7 @@ import pytest
 from build_cache import ROOT, build_user_model
 from models import DOP853, ODE23, ODE45, RADAU9, RODAS
 from scipy.linalg import expm
-from variants import slow_after
+from variants import campaign_after
 
 METHODS = [f"--method={label}" for label in ("ode23", "ode45", "dop853", "rodas", "radau9")]
 K, P, STOP = 128.0, 2.0, 1.0
@@ -45,7 +45,7 @@ def exact_positions(n, t):
 
 
 @pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS, RADAU9])
-@pytest.mark.parametrize("n", slow_after(1, [4, 2, 8]))
+@pytest.mark.parametrize("n", campaign_after(1, [4, 2, 8]))
 def test_a_pushed_chain_starts_with_every_method(worker, tmp_path, n, method):
     (file := tmp_path / "chain.py").write_text(chain(n))
     path = build_user_model(file, *METHODS) / "chain.fmu"

@@ -8,7 +8,7 @@ from build_cache import build_user_model
 from models import DOP853, ODE23, ODE45, RADAU9, RODAS
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 METHODS = (ODE23, ODE45, DOP853, RODAS, RADAU9)
 LABELS = [f"--method={label}" for label in ("ode23", "ode45", "dop853", "rodas", "radau9")]
@@ -89,7 +89,7 @@ def changes(fmu, values, method, rtol):
     return [tuple(after[1:]) for before, after in pairwise(rows) if after[0] != before[0]]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", [pytest.param("python", marks=pytest.mark.campaign), "native"])
 @pytest.mark.parametrize("name", ["touching_block", "touching_stack"])
 def test_a_contact_at_rest_stays_stuck_where_its_limit_touches_the_load(worker, built, name, kind):
@@ -136,9 +136,9 @@ def solve_dips(push):
         events.append((t, mode))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("depth", [0.3, pytest.param(0.01, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("depth", [0.3, pytest.param(0.01, marks=pytest.mark.campaign)])
 def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, built, depth, kind):
     values = {"p": P, "push": P * (1.0 + depth), "angle0": np.pi}
     expected, x = solve_dips(values["push"])
@@ -154,7 +154,7 @@ def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, built, d
     fmu.free()
 
 
-@pytest.mark.parametrize("kind", slow_after(1, KINDS))
+@pytest.mark.parametrize("kind", campaign_after(1, KINDS))
 def test_friction_that_vanishes_for_longer_ends_mode_0(worker, built, kind):
     """It vanishes while cos(angle) > 0.5: from -60 to 60 degrees of each turn."""
     fmu = worker.instantiate(built("lifting_block", kind))

@@ -7,7 +7,7 @@ from build_cache import build_user_model
 from models import DOP853, ODE23, ODE45, RADAU9, RODAS
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
-from variants import slow_after
+from variants import campaign_after
 
 STOP, T_ON, END = 4.0, 1.0, 1.02
 RATES = {  # of each kind of exception: start value and rate, as the model and as Python write it
@@ -33,7 +33,7 @@ class Late(Model):
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    slow_after(1, [*((name, "") for name in RATES), ("log", "native"), ("division", "native")]),
+    campaign_after(1, [*((name, "") for name in RATES), ("log", "native"), ("division", "native")]),
 )
 def test_a_trial_step_outside_the_domain_of_a_function_is_repeated(worker, tmp_path, name, kind):
     start, rate, function = RATES[name]

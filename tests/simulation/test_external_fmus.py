@@ -13,7 +13,7 @@ import commands
 import external_fmus
 import numpy as np
 import pytest
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 from harness import describe, load_result
 from harness.scenes.run_spec import RunSpec
@@ -232,7 +232,7 @@ def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run,
 @pytest.mark.parametrize(
     ("kind", "message"),
     [
-        *slow_after(
+        *campaign_after(
             3,
             [
                 (2, "its binary crashed (Segmentation fault), after t = 0.5 s"),

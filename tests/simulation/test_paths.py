@@ -23,7 +23,7 @@ def odd_folder(tmp_path, fmus):
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "command",
     [

@@ -10,7 +10,7 @@ import harness
     ("fmu", "name", "values", "message"),
     [
         ("smd", "m", (2.0, -1.0, 3.0), "m = -1.0 kg is refused"),
-        pytest.param("Faulty", "kind", (0, 2, 4), "its binary crashed", marks=pytest.mark.slow),
+        pytest.param("Faulty", "kind", (0, 2, 4), "its binary crashed", marks=pytest.mark.campaign),
     ],
 )
 def test_a_refused_run_changes_no_later_one(fmus, fmu, name, values, message):
@@ -23,7 +23,7 @@ def test_a_refused_run_changes_no_later_one(fmus, fmu, name, values, message):
         assert runs.final_x.iloc[number] == harness.simulate(path, {name: values[number]}, stop=1.0)["x"][-1]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_an_fmu_for_one_instance_in_a_process_has_a_process_for_each_run(tmp_path):
     """Such an FMU may keep values of an earlier instance; here its output is the number of its process."""
     changes = {

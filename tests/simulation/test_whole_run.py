@@ -208,7 +208,7 @@ def test_the_native_fmu_of_the_same_model_is_taken(fmus, tmp_path):
     assert native_equivalent(native) == native
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_native_fmu_is_built_from_the_model_file(fmus, tmp_path):
     require_compiler()
     python = tmp_path / "smd.fmu"

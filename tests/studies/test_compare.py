@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from build_cache import run_published_cases
 from scipy.io import savemat
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 from harness import HarnessError, ModeChanges, Signals, compare
 
@@ -72,8 +72,8 @@ def test_the_interface_of_the_command_line_is_used(harness, external_fmu_folder)
     assert "offers co-simulation; model exchange is not among them" in done.stderr
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("stop", [10, pytest.param(9.95, marks=pytest.mark.slow)])
+@pytest.mark.campaign
+@pytest.mark.parametrize("stop", [10, pytest.param(9.95, marks=pytest.mark.campaign)])
 def test_fmus_with_one_fixed_internal_step_agree_on_a_shared_grid(harness, external_fmu_folder, tmp_path, stop):
     """FMI 3.0 can declare the step, FMI 2.0 cannot; each way round."""
     declared = {"modelDescription.xml": lambda text: text.replace("<CoSimulation ", DECLARED_STEP)}
@@ -450,7 +450,7 @@ def test_a_name_longer_than_its_column_is_printed_in_full(tmp_path):
 
 @pytest.mark.parametrize(
     ("pair", "message"),
-    slow_after(
+    campaign_after(
         1,
         [
             (("Midpoint", "ModelExchangeOnly"), "fmpy's CVode at rtol"),

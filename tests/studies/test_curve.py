@@ -6,7 +6,7 @@ import commands
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 
@@ -27,7 +27,7 @@ def write_points(file, headings, backward, v=V):
 
 @pytest.mark.parametrize(
     ("headings", "backward", "speed", "force"),
-    slow_after(
+    campaign_after(
         1, [("v [m/s],F [N]", FORWARD, "v", "F_friction"), ("w [rad/s],T [N.m]", BACKWARD, "omega", "T_friction")]
     ),
 )

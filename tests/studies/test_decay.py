@@ -100,7 +100,7 @@ def test_standard_input_is_accepted_as_a_record(tmp_path):
     assert json.loads(done.stdout)["record"] == "stdin"
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_record_needs_no_fmu_modules_and_one_drawing(tmp_path):
     """No module that runs FMUs or takes long to import is imported; the figure is drawn once."""
     program = """

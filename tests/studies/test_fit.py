@@ -14,7 +14,7 @@ from fmpy import read_model_description
 from native_fmus import build_native_fmus, require_compiler
 from scipy.integrate import solve_ivp
 from shared_keys import check_shared_keys
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 from benchmarks.campaigns.drawn_records import GROUPS, draw_record
@@ -92,7 +92,7 @@ def test_the_parameters_of_a_drawn_record_are_found(name):
         assert estimate.low <= estimate.value <= estimate.high
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_means_of_samples_do_not_shift_the_values_of_a_long_record():
     """Quantised, so that the noise is smaller than it seems: means across the slips shifted k by 10 standard errors."""
     record, fit = fit_drawn("force", [57721, 3, 18], max_samples=20_000)
@@ -122,7 +122,7 @@ def test_a_position_determines_the_ratio_of_stiffness_and_mass():
 DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("displacement", "undetermined", "is_remarked"),
     slow_after(
@@ -240,7 +240,7 @@ EXACT = {  # record, and what is free, observed and fixed
 }
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", EXACT)
 def test_exact_derivatives_find_what_differences_find_with_fewer_runs(monkeypatch, name):
     """Where every second derivative does not exist, differences replace it."""
@@ -273,8 +273,8 @@ def test_exact_derivatives_find_what_differences_find_with_fewer_runs(monkeypatc
     assert next(count) > 2  # derivatives were wanted
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.084, pytest.param(-0.1, marks=pytest.mark.slow)])
+@pytest.mark.campaign
+@pytest.mark.parametrize("delay", [0.084, pytest.param(-0.1, marks=pytest.mark.campaign)])
 def test_the_delay_of_a_sensor_is_identified(delay):
     """The delayed signal is interpolated from a run with 20 times as many samples."""
     fine = np.linspace(0.0, 8.0, 4001)
@@ -358,7 +358,7 @@ def test_a_profile_crosses_its_limit_where_the_interval_ends():
         assert np.interp([estimate.low, estimate.high], value, root) == pytest.approx([-1.0, 1.0], abs=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_outliers_count_little_in_a_robust_fit():
     frame = pull()
     frame.loc[::25, "x"] += 0.3
@@ -481,7 +481,7 @@ def test_the_campaign_summarizes_its_log(tmp_path, capsys):
 LAWS = {"free": ["k", "mu_s", "mu_d", "f_s", "f_d"], "values": {"v_driver": 0.04, "v_s": 0.2}}
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("record_of", "v_s"), [("stickslip", None), ("stribeck_sled", 0.2)])
 def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
     fmus = [native("stickslip"), native("stribeck_sled")]
@@ -508,7 +508,7 @@ def compared():
     return [harness.fit(one, frame, ["mu_s", "f_s"], against=two, **options) for one, two in (fmus, fmus[::-1])]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_bic_is_that_of_white_residuals_of_a_linear_model(compared):
     """For n residuals of variance s2 and k unknowns, BIC = n ln(s2) + k ln(n)."""
     fit = compared[0]
@@ -527,7 +527,7 @@ def test_residuals_count_as_those_of_the_law_with_the_smallest(compared):
             assert compared_law.bic == pytest.approx(n * np.log(law.squares / 81) + len(law.estimates) * np.log(n))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_command_writes_the_compared_laws(tmp_path):
     frame = pull(t=T[:81]).rename(columns={"t": "t [s]", "x": "x [m]"})
     frame.to_csv("pull.csv", index=False)
@@ -550,7 +550,7 @@ def test_the_command_writes_the_compared_laws(tmp_path):
     assert printed["comparison"]["verdict"] in " ".join(table.split())
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
     pytest.importorskip("pandas")
     from benchmarks.campaigns import fit_peers
@@ -578,7 +578,7 @@ def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
     assert lines[3].strip() == "failed: AttributeError: no such thing"
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("model", "omega", "free"),
     [
@@ -598,7 +598,7 @@ def test_one_noise_of_all_samples_does_not_move_the_fit(model, omega, free):
     assert fits[-1]._headline == ", ".join(f"{name} not determined" for name in free)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", ["long", "quantised"])
 def test_one_noise_of_all_samples_moves_no_values_of_a_long_or_quantised_record(kind):
     """A long record is averaged where its own scatter allows it, whatever noise is stated."""
@@ -614,7 +614,7 @@ def test_one_noise_of_all_samples_moves_no_values_of_a_long_or_quantised_record(
     assert fits[0].values["f"] == pytest.approx(0.3, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_irregular_slips_are_described_one_by_one():
     """Of a real surface each slip starts at another force, which no fit of one static friction describes."""
     random, t = np.random.default_rng(0), np.linspace(0.0, 40.0, 801)
@@ -669,7 +669,7 @@ def test_slips_that_an_input_makes_irregular_are_described_by_the_fit_alone():
 
 @pytest.mark.parametrize(
     ("kind", "words"),
-    slow_after(
+    campaign_after(
         0,
         [
             ("lag", "x lags by 0.02"),

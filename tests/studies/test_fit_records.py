@@ -37,7 +37,7 @@ def driven_record(lost=()):
     return frame({"t": T, "x": x, "force": force}, {"t": "s", "x": "m", "force": "N"})
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_missing_samples_of_a_signal_take_none_of_the_input():
     """Half of a pulse lies where x is missing."""
     options = {"free": {"k": (50.0, 200.0), "f": (0.1, 2.0)}, "observe": "x", "inputs": {"F_ext": "force"}}
@@ -106,7 +106,7 @@ def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sent
     assert json.loads(done.stdout)["notes"][0] == fit.notes[0].replace("`observe`", "--observe")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_column_with_the_name_of_an_input_drives_the_runs():
     """Without it, the fit would explain the motion by other parameters."""
     push = {"time": T, "F_ext": 3.0 * np.sin(11.0 * T)}
@@ -136,7 +136,7 @@ def test_a_choice_between_columns_is_left_to_the_user(model, units, words):
         assert text in str(refused.value)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_noise_of_an_input_is_named_as_the_cause_and_in_the_intervals():
     push = 5.0 * np.sin(2.7 * T) + 3.0 * np.sin(7.0 * T)
     truth = {"f": 0.7, "c": 0.4}

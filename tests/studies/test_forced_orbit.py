@@ -33,7 +33,7 @@ class Clocked(Model):
 '''
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("unit", "rate", "angle", "options"),
     [
@@ -66,7 +66,7 @@ def test_an_oscillator_with_a_square_force_has_the_orbit_of_its_closed_form():
     np.testing.assert_allclose(np.prod(orbit.multipliers), np.linalg.det(half) ** 2, rtol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_an_orbit_with_a_triangular_force_is_the_end_of_a_long_run():
     period, values = 0.9, {"f": 4.0}
     inputs = {"time": period * np.array([0.0, 0.25, 0.75, 1.0]), "F_ext": [0.0, 9.0, -9.0, 0.0]}
@@ -152,7 +152,7 @@ STOPS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_forced_mass_has_the_counts_of_stops_of_hong_and_liu():
     """H.-K. Hong, C.-S. Liu, Journal of Sound and Vibration 229 (2000) 1171-1192, name these counts, and 1."""
     for stops, (frequency, friction) in STOPS.items():

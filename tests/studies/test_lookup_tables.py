@@ -54,7 +54,7 @@ def draw(result):
     return {axes.get_title(): axes for axes in figure.get_axes()}
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("truth", "free"),
     [({"F_0": 12.0, "F_1": 10.0}, ["F_0", "F_1"]), ({"scale": 0.8}, ["scale"])],
@@ -101,7 +101,7 @@ def test_points_are_listed_and_drawn_with_the_values_of_a_run(sled, tmp_path, mo
     assert ([*x], [*y]) == ([*X], [*(VALUES | {"F_2": 7.5}).values()])
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("sample", slow_after(1, [{}, {"samples": 30, "seed": 1}]), ids=["grid", "sample"])
 def test_a_sweep_of_values_of_a_table_shows_its_curves(sled, tmp_path, sample):
     varied = {"F_0": [12.0, 13.0, 14.0], "F_2": [8.0, 8.5]} if not sample else {"F_0": (12.0, 14.0), "F_2": (8.0, 9.0)}

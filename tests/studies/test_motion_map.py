@@ -27,7 +27,7 @@ def test_the_map_of_the_belt_has_the_edges_of_closed_forms():
     assert shared.edges == result.edges
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_map_of_an_fmu_of_another_tool_counts_returns_by_its_saved_states(tmp_path):
     """Without the variables that expose its steps, the belt is such an FMU."""
     rename = {"modelDescription.xml": lambda text: text.replace("solver.t_next", "solver.next")}
@@ -103,7 +103,7 @@ def test_points_at_which_runs_fail_are_a_region(in_workspace):
         harness.map_motions(native("coulomb"), {"f": [-2.0, -1.5, -1.0]}, measure="events", workers=1)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_map_of_a_forced_mass_counts_its_stops():
     result = harness.map_motions(native("forced"), {"Omega": [5.0, 6.0, 7.0]})
     assert result.labels == (*["2 sticks in a period"] * 2, "0 sticks in a period")

@@ -83,7 +83,7 @@ def return_to_belt(v_belt, x):
     return x, duration
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_reversal_of_the_slip_is_no_stick():
     result = harness.orbit(build_text("reversing", REVERSING), over={"v_b": [0.7, 0.95, 1.2]})
     (point,) = result.points
@@ -136,7 +136,7 @@ def growth_of_amplitude(c0, start, c2=0.1, c4=0.1):
     return run.y[0, -1] - 0.1 - start
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_two_orbits_meet_in_a_fold():
     """Also where they lie between two of the amplitudes that are scanned."""
     result = harness.orbit(build_text("meeting", MEETING), over={"c0": [-0.02, -0.012, -0.01]})
@@ -333,7 +333,7 @@ def follow_pair(y, v_b, stop):
     return y
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("section", [None, "x1", "mode1"])
 def test_an_orbit_of_two_blocks_is_found_by_each_section_and_repeats_in_scipy(section, tmp_path):
     result = harness.orbit(pair(), {"v_b": 0.8}, section=section)
@@ -351,7 +351,7 @@ def test_an_orbit_of_two_blocks_is_found_by_each_section_and_repeats_in_scipy(se
         assert abs(marked[0, 1]) < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_of_several_blocks_both_motions_are_followed_from_either_side():
     """Steady sliding turns stable where an eigenvalue crosses zero; stick-slip goes on from the speed below."""
     start = {"x1_0": 0.86, "v1_0": 0.25, "x2_0": -0.13, "v2_0": -0.26}
@@ -369,7 +369,7 @@ def test_of_several_blocks_both_motions_are_followed_from_either_side():
     assert kinds[2:] == [(v, kind, "stable") for v in (1.2, 1.6) for kind in (STEADY, STICK_SLIP)]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_of_a_python_fmu_its_native_twin_is_run(tmp_path):
     require_compiler()
     folder = build_user_model(commands.ROOT / "fmus" / "more" / "belt.py")
@@ -398,8 +398,8 @@ def test_arguments_are_refused_in_one_sentence(arguments, message):
     ("name", "message"),
     [
         ("servo", "no parameter sets v at the start"),
-        pytest.param("sleds", "no parameter sets v_1 at the start", marks=pytest.mark.slow),
-        pytest.param("clutch", "no force that depends on a position or a speed", marks=pytest.mark.slow),
+        pytest.param("sleds", "no parameter sets v_1 at the start", marks=pytest.mark.campaign),
+        pytest.param("clutch", "no force that depends on a position or a speed", marks=pytest.mark.campaign),
     ],
 )
 def test_models_without_starts_or_oscillations_are_refused(name, message):

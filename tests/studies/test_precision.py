@@ -215,7 +215,7 @@ def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
     assert soft.rms > steep.rms
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(fmus):
     """The bristles of LuGre and of the elasto-plastic law, against a block that sticks, by two methods."""
     dry = solve_dry_block()
@@ -234,7 +234,7 @@ def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(
 @pytest.mark.parametrize(
     ("path", "ending"),
     [
-        pytest.param(path, ending, marks=pytest.mark.slow if path.stem != "viscous_pendulum" else ())
+        pytest.param(path, ending, marks=pytest.mark.campaign if path.stem != "viscous_pendulum" else ())
         for path, ending in zip(EXAMPLE_MODELS, cycle((".py", ".fmu")))
     ],
     ids=lambda one: Path(one).name,

@@ -162,6 +162,7 @@ def two_studies(both, fmus, tmp_path_factory):
     return outputs, files, pages, out / "precision"
 
 
+@pytest.mark.campaign
 def test_the_command_shows_both_interfaces_and_error_against_tolerance(two_studies):
     (output, _), files, *_ = two_studies
     assert "  FMI 3.0 CS: exact  " in output

@@ -12,7 +12,7 @@ import pytest
 from build_cache import ROOT, build_user_model
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 
@@ -57,7 +57,7 @@ def is_title_covered(axes):
     return bool(legend and legend.get_window_extent().overlaps(title.get_window_extent()))
 
 
-@pytest.mark.parametrize("name", slow_after(2, SCENES))
+@pytest.mark.parametrize("name", campaign_after(2, SCENES))
 def test_a_curve_is_smooth_despite_large_steps(draw, name):
     _, panels = draw(name)
     for t, _ in curves(panels).values():
@@ -95,7 +95,7 @@ def test_a_figure_explains_each_label_once(draw, name):
     assert sorted(labels) == sorted({*labels}) != []
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_run_without_named_plots_has_no_panel_of_its_mode(fmus, tmp_path):
     figures = []
     with patch.object(Figure, "savefig", lambda figure, *_, **__: figures.append(figure)):
@@ -202,7 +202,7 @@ def test_each_contact_force_is_shaded_where_its_own_contact_sticks(blocks_run):
         _ = run.events.mode
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_order_of_declaration_does_not_exchange_the_contacts(tmp_path):
     """Modes declared in another order than the contacts belong to the contacts that name them."""
     source = (CONTACTS / "sleds.py").read_text(encoding="utf-8").replace("mode_1, mode_2 =", "mode_2, mode_1 =")
@@ -213,7 +213,7 @@ def test_the_order_of_declaration_does_not_exchange_the_contacts(tmp_path):
     }
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_input_signals_are_plotted_with_the_outputs():
     run = harness.simulate(
         build_fmu(CONTACTS / "stacked.py"), inputs={"time": [0.0, 4.0, 8.0], "F_ext": [0.0, 5.0, 0.0]}
@@ -239,7 +239,7 @@ class Named(Model):
 """
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_an_output_takes_precedence_over_the_panel_of_its_name(tmp_path):
     """Each is drawn as a curve over time, also by a scene, and no panel is drawn in its place."""
     text = OUTPUTS_NAMED_LIKE_PANELS.replace(

@@ -12,7 +12,7 @@ from external_fmus import build_external_fmus, edited_copy
 from fmi3_fixtures import build_fmi3_fmus
 from models import MODELS
 from native_fmus import build_native_fmus
-from variants import slow_after
+from variants import campaign_after, slow_after
 
 import harness
 from benchmarks.campaigns.random_models import STOP, random_structure, random_values, write_model
@@ -149,7 +149,7 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "parameters", "values", "outputs"), slow_after(2, OTHERS))
+@pytest.mark.parametrize(("name", "parameters", "values", "outputs"), campaign_after(2, OTHERS))
 def test_derivatives_are_those_of_differences(name, parameters, values, outputs):
     times = [2.0, 4.6, 5.1, 8.0] if name in ("stickslip", "pacejka") else [0.8, 1.7, 2.5, 3.3]
     fmu = build_native_fmus() / f"{name}.fmu"
@@ -259,10 +259,8 @@ def test_a_force_that_touches_the_limit_at_its_corner_is_reported():
     assert right.tolist() == [0.0, 0.0, 0.0]
 
 
-@pytest.mark.parametrize(
-    "seed",
-    [pytest.param(n, marks=pytest.mark.slow if n == 8 else pytest.mark.campaign) for n in range(30)],
-)
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(30))
 def test_derivatives_of_random_models_are_those_of_differences(seed, tmp_path):
     """Up to three bodies and contacts, with belts, drivers, limited loads and falling friction.
 

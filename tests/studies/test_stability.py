@@ -262,7 +262,7 @@ def test_every_case_of_a_shipped_model_ends_as_expected(user_folder, tmp_path, m
     assert len({row.case.title for row in rows}) == sum(n_values)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["rotor_brake", "sleds", "belt"])
 def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     """Its values, its tolerances and nonfinite numbers, by every method; a rule between two values may refuse them,
@@ -294,7 +294,7 @@ class Relax(Model):
 '''
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_precision(tmp_path):
     (tmp_path / "relax.py").write_text(RELAX)
     assert commands.build("relax.py", folder=tmp_path).returncode == 0
@@ -307,7 +307,7 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     assert (tmp_path / "results/precision/relax/points.csv").is_file()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_case_whose_reference_misses_a_pulse_is_wrong(tmp_path):
     (tmp_path / "pulses.py").write_text(PULSES)
     assert commands.build("pulses.py", folder=tmp_path).returncode == 0

@@ -10,7 +10,7 @@ import external_fmus
 import numpy as np
 import pytest
 from sweep_results import open_sweep, sweep_folder
-from variants import slow_after
+from variants import campaign_after
 
 import harness
 
@@ -110,7 +110,7 @@ def test_a_sled_pulled_backward_has_the_measures_of_one_pulled_forward(sweep):
     assert forward[1] == pytest.approx(3.7169, abs=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(command, tmp_path):
     for workers in (1, 2):
         done = command(*MAP, "--workers", workers, "--out", f"out{workers}")
@@ -170,7 +170,7 @@ REASONS = {  # why some have no run to show
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=() if name in ("Arrays", *REASONS) else pytest.mark.slow)
+        pytest.param(name, marks=() if name in ("Arrays", *REASONS) else pytest.mark.campaign)
         for name in external_fmus.SWEEP_AXES
         if name != "Gain"  # zero without an input
     ],
@@ -192,7 +192,7 @@ def test_an_external_fmu_is_swept_or_refused_with_a_reason(command, tmp_path, na
     assert any(len(set(measured.to_numpy().tolist())) == 2 for measured in data.data_vars.values())
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_crashing_and_failing_runs_of_an_external_fmu_are_reported_individually(command, tmp_path):
     """With kind 0 it succeeds, with 2 it crashes, with 6 it fails."""
     trouble = external_fmus.build_external_fmus() / "Faulty.fmu"
@@ -245,7 +245,7 @@ def test_values_that_are_too_large_for_an_axis_are_results(fmus, grid):
     pyplot.close("all")
 
 
-@pytest.mark.parametrize("workers", slow_after(1, [None, 1]))
+@pytest.mark.parametrize("workers", campaign_after(1, [None, 1]))
 def test_one_run_that_works_is_a_sweep(sweep, workers):
     """Wherever it is among runs that fail."""
     mu_d = [0.95, 0.6, 0.96, 0.97, 0.98]  # mu_s is 0.9

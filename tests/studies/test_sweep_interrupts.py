@@ -102,6 +102,7 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_p
     assert "tuple" not in (bound.read_text() if bound.exists() else "")
 
 
+@pytest.mark.campaign
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(fmus, tmp_path):
     """In any block, and with any other work in progress; the process of this test is spared.
 

@@ -213,7 +213,7 @@ def test_a_frame_at_rest_is_the_ground():
     assert move_frame(find_source("spring").read_text()) is None
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_wrong_model_in_another_order_or_frame_is_found(tmp_path, monkeypatch):
     """A declaration that another order changes, and an equation that depends on the frame, differ."""
     monkeypatch.setattr("benchmarks.symmetry.study.reverse_declarations", lambda text: text.replace("40.0", "40.01"))

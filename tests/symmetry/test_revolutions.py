@@ -92,7 +92,7 @@ def test_no_revolution_of_a_crank_changes_its_motion():
     assert examine("slider_crank", PYTHON, ("ode45",)) == (len(REVOLUTIONS_ADDED), [])
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("backend", [NATIVE, PYTHON])
 @pytest.mark.parametrize("machine", MACHINES)
 def test_no_revolution_of_a_machine_changes_its_motion(machine, backend):

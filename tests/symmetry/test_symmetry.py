@@ -6,7 +6,7 @@ from contextlib import redirect_stderr
 from io import StringIO
 
 import pytest
-from variants import slow_after
+from variants import campaign_after
 
 from benchmarks.symmetry.builds import FMI3, NATIVE
 from benchmarks.symmetry.changes import FRAME, LONG, MIRROR, REVOLUTIONS, TIME, UNITS
@@ -37,7 +37,7 @@ HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start v
 }
 
 
-@pytest.mark.parametrize("label", slow_after(1, FEW_MODELS))
+@pytest.mark.parametrize("label", campaign_after(1, FEW_MODELS))
 def test_a_motion_depends_on_no_time_unit_sign_order_or_frame(label):
     examined, differences = examine(label, methods=FEW_MODELS[label], **FEW)
     assert {*examined} == {kind for kind in KINDS if kind != REVOLUTIONS or label in HAVE_ANGLES}
@@ -51,7 +51,7 @@ def check_all_changes(label, **options):
     assert not differences
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", ["smd", "stacked", "servo"])
 def test_no_motion_of_a_further_model_depends_on_them(label):
     check_all_changes(label, methods=("ode45",), **FEW)
@@ -73,10 +73,8 @@ def test_native_motions_depend_on_no_time_unit_or_sign(label, backend):
     assert not differences
 
 
-@pytest.mark.parametrize(
-    "label",
-    [pytest.param(label, marks=pytest.mark.campaign if label == "joint" else pytest.mark.slow) for label in PERIODIC],
-)
+@pytest.mark.campaign
+@pytest.mark.parametrize("label", PERIODIC)
 def test_every_period_of_a_long_run_has_the_same_events(label):
     examined, differences = examine(
         label, NATIVE if label == "stickslip" else "python", (LONG,), long_run=PERIODIC[label]

@@ -4,7 +4,8 @@ import json
 
 import pytest
 import web_page
-from models import MODELS, parameters
+from models import STICKSLIP_IN_CI, parameters
+from variants import campaign_after
 
 pytestmark = pytest.mark.slow
 
@@ -13,7 +14,7 @@ WIDTHS = (360, 768, 1280)
 CONTROLS = {"button", "checkbox", "combobox", "radio", "slider", "spinbutton", "textbox", "link", "DisclosureTriangle"}
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", STICKSLIP_IN_CI)
 def test_no_width_makes_it_scroll_sideways_and_every_control_has_a_name(page, name):
     page.open(f".model={name}")
     for width in WIDTHS:
@@ -32,7 +33,7 @@ def test_no_width_makes_it_scroll_sideways_and_every_control_has_a_name(page, na
     assert "Mechanism:" in json.dumps(tree)
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", campaign_after(1, WIDTHS))
 def test_nothing_shifts_while_the_page_appears(page, width):
     page.browser.size(width)
     script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=web_page.SHIFTS)

@@ -4,6 +4,7 @@ import re
 
 import pytest
 import web_page
+from variants import campaign_after
 
 from tests.docs.test_docs import load, read_description
 
@@ -76,7 +77,7 @@ def test_a_slider_of_a_story_changes_its_text_and_stops_where_the_model_refuses(
     assert "0.6 instead of 0.9" in text(still, "#squeaks .text")
 
 
-@pytest.mark.parametrize("width", [360, 1280])
+@pytest.mark.parametrize("width", campaign_after(1, [360, 1280]))
 def test_bodies_of_the_opening_and_the_stories_stay_under_the_pointer(still, width):
     still.browser.size(width, 740)
     still.run("app.stories.forEach(story => story.seek(0))")
@@ -108,7 +109,7 @@ def test_keys_move_a_body_and_let_it_go(still):
     assert text(still, "#opening .motion") == "at rest"
 
 
-@pytest.mark.parametrize("width", [360, 1280])
+@pytest.mark.parametrize("width", campaign_after(1, [360, 1280]))
 def test_the_opening_fits_its_window_and_does_not_shift(page, width):
     page.browser.size(width)
     script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=web_page.SHIFTS)
