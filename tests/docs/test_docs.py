@@ -131,7 +131,6 @@ def test_the_picture_of_the_laws_is_that_of_its_script(images, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_the_picture_of_four_laws_is_that_of_their_runs(images, tmp_path):
     (tmp_path / "fmus" / "more").symlink_to(build_once("more-bristles", "lugre", "elastoplastic"))
     images.draw_friction_laws(tmp_path)
