@@ -52,7 +52,7 @@ def pytest_configure_node(node):
 @pytest.fixture(scope="session")
 def fmus():
     """The folder of the built FMUs."""
-    return build_cache.build_once("fmi2")
+    return build_cache.build_once()
 
 
 @pytest.fixture(scope="module")

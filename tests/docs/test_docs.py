@@ -132,7 +132,7 @@ def test_the_picture_of_the_laws_is_that_of_its_script(images, tmp_path):
 
 @pytest.mark.slow
 def test_the_picture_of_four_laws_is_that_of_their_runs(images, tmp_path):
-    (tmp_path / "fmus" / "more").symlink_to(build_once("more-bristles", "lugre", "elastoplastic"))
+    (tmp_path / "fmus" / "more").symlink_to(build_once("lugre", "elastoplastic"))
     images.draw_friction_laws(tmp_path)
     assert_same_texts(DOCS / "images" / "friction-laws.svg", tmp_path / "friction-laws.svg")
 
@@ -249,7 +249,7 @@ def errors_of_rest(t, x, y):
 @pytest.mark.slow
 def test_the_errors_of_friction_in_a_plane_on_the_page_are_those_of_runs():
     require_compiler()
-    fmu = build_once("puck-native", "puck", "--native", "--platform", "linux64") / "puck.fmu"
+    fmu = build_once("puck", "--native", "--platform", "linux64") / "puck.fmu"
     gravity, friction = 9.81 * np.sin(0.4), 0.5 * 9.81 * np.cos(0.4)
 
     def rates(_, y):

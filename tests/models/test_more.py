@@ -34,8 +34,8 @@ def built(name, kind="python"):
         require_compiler()
         platform = ["--platform", "linux64"]
     if kind == "fmi3":
-        return build_once(f"more-fmi3-{name}", name, *KINDS[kind], *platform) / f"{name}.fmu"
-    return build_once(f"more-{kind}", "--more", *KINDS[kind], *platform) / f"{name}.fmu"
+        return build_once(name, *KINDS[kind], *platform) / f"{name}.fmu"
+    return build_once("--more", *KINDS[kind], *platform) / f"{name}.fmu"
 
 
 def states(name):

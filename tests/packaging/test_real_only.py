@@ -23,7 +23,7 @@ OPTIONS = {
     "FMI 3.0": ("--fmi", "3", "--platform", "linux64"),
 }
 EVERYTHING = {
-    "python": lambda: build_cache.build_once("fmi2"),
+    "python": build_cache.build_once,
     "native": native_fmus.build_native_fmus,
     "FMI 3.0": fmi3_fixtures.build_fmi3_fmus,
 }
@@ -46,8 +46,7 @@ def folders(backend):
     """Return the folders with the FMUs that have all variables, and with those that have Reals only."""
     if backend != "python":
         native_fmus.require_compiler()
-    name, options = backend.replace(" ", ""), ("--real-only", *OPTIONS[backend])
-    return EVERYTHING[backend](), build_cache.build_once(f"reals-{name}", *REDUCED_MODELS, *options)
+    return EVERYTHING[backend](), build_cache.build_once(*REDUCED_MODELS, "--real-only", *OPTIONS[backend])
 
 
 def motion(fmu, names):

@@ -23,7 +23,7 @@ HYBRID = {"stickslip": STICKSLIP, "belt": {"k": 0.0, "v_belt": 0.0, "F_ext": LOA
 @pytest.fixture(scope="module")
 def more():
     """The folder of the FMUs of fmus/more."""
-    return build_once("more-python", "--more")
+    return build_once("--more")
 
 
 def hold_and_release(fmu):

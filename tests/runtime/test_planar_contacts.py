@@ -106,7 +106,7 @@ def puck(build):
 @pytest.fixture(scope="module")
 def shipped():
     require_compiler()
-    return build_once("puck-native", "puck", *NATIVE) / "puck.fmu"
+    return build_once("puck", *NATIVE) / "puck.fmu"
 
 
 @pytest.mark.parametrize(("F", "phi"), slow_after(3, SCENES))

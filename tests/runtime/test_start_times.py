@@ -24,7 +24,7 @@ def kind(request):
 
 
 def built(name, kind):
-    return build_once(f"more-{kind}-{name}", name, *KINDS[kind]) / f"{name}.fmu"
+    return build_once(name, *KINDS[kind]) / f"{name}.fmu"
 
 
 def follow_events(fmu, start, stop, modes):

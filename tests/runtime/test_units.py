@@ -32,7 +32,7 @@ def run(worker, fmus, name, method, *exponents):
         if meaning.causality in ("parameter", "input") and meaning.type == "Real"
     }
     stop = model.stop_time * factor("s", *exponents)
-    fmu = worker.instantiate((build_once("more-python", "--more") if name in MORE else fmus) / f"{name}.fmu")
+    fmu = worker.instantiate((build_once("--more") if name in MORE else fmus) / f"{name}.fmu")
     fmu.begin(values | ({"solver.method": method} if method else {}), stop=stop)
     columns = [*model.states, "events.t_last"]
     factors = [factor(declared[state].unit, *exponents) for state in model.states] + [factor("s", *exponents)]

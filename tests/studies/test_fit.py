@@ -35,8 +35,7 @@ def native(model):
     if model not in SOURCES:
         return build_native_fmus() / f"{model}.fmu"
     require_compiler()
-    words = (str(SOURCES[model]), "--native", "--platform", "linux64")
-    return build_cache.build_once(f"native-{model}", *words) / f"{model}.fmu"
+    return build_cache.build_once(SOURCES[model], "--native", "--platform", "linux64") / f"{model}.fmu"
 
 
 def pull(outputs=("x",), values=TRUTH, t=T, noise=0.01, seed=1):

@@ -68,12 +68,19 @@ def build(*words, folder=ROOT, optimised=False):
     return done.stdout
 
 
-def build_once(name, *words, optimised=False):
-    """Return the folder with the FMUs built with these arguments; the output of the build is in `name`.txt beside
+def name_build(kind, *words):
+    """Return the name of a build with these arguments; the content of a model file, which is a Path, counts."""
+    digests = (f"{w.stem}-{sha256(w.read_bytes()).hexdigest()[:12]}" if isinstance(w, Path) else w for w in words)
+    return " ".join((kind, *digests))
+
+
+def build_once(*words, optimised=False):
+    """Return the folder with the FMUs built with these arguments; the output of the build is in a file .txt beside
     it."""
+    name = name_build("optimised" if optimised else "unoptimised", *words)
 
     def make(folder):
-        (kept_folder / f"{name}.txt").write_text(build(*words, "--out", folder, optimised=optimised))
+        (kept_folder / f"{name}.txt").write_text(build(*map(str, words), "--out", folder, optimised=optimised))
 
     return keep_build(name, make)
 
@@ -86,8 +93,7 @@ def build_user_model(path, *words, optimised=False):
         printed = build(path.name, *words, folder=folder, optimised=optimised)
         assert printed.startswith(f"{path.stem}.fmu ")
 
-    digest = sha256(path.read_bytes()).hexdigest()[:12]  # tests may have different models of one name
-    return keep_build("-".join((path.stem, digest, *words, *["optimised"] * optimised)), make)
+    return keep_build(name_build("user optimised" if optimised else "user", path, *words), make)
 
 
 def run_published_cases():
@@ -95,7 +101,7 @@ def run_published_cases():
     stderr."""
 
     def make(folder):
-        (folder / "fmus").symlink_to(build_once("fmi2"))
+        (folder / "fmus").symlink_to(build_once())
         done = commands.run_process(folder, COLUMNS="80")
         (folder / "process.json").write_text(json.dumps([done.returncode, done.stdout, done.stderr]))
 

@@ -14,7 +14,7 @@ from native_fmus import require_compiler
 def build_fmi3_fmus():
     """Return the folder of the FMI 3.0 FMUs."""
     require_compiler()
-    return build_cache.build_once("fmi3", "--fmi", "3", "--platform", "linux64")
+    return build_cache.build_once("--fmi", "3", "--platform", "linux64")
 
 
 REDUCED = {"stickslip": ("ode23", "hybrid"), "coulomb": ("rodas", "sign")}

@@ -20,7 +20,7 @@ def require_compiler():
 def build_native_fmus():
     """Return the folder of the native FMUs for Linux."""
     require_compiler()
-    return build_cache.build_once("linux64", "--native", "--platform", "linux64", optimised=True)
+    return build_cache.build_once("--native", "--platform", "linux64", optimised=True)
 
 
 @cache
@@ -29,9 +29,8 @@ def build_for_all_platforms():
     only the platforms matter here."""
     require_compiler()
     options = ("smd", "--native", "--method", "exact")
-    return build_cache.build_once(
-        "everywhere", *options, *(word for item in PLATFORMS for word in ("--platform", item)), optimised=True
-    )
+    platforms = (word for item in PLATFORMS for word in ("--platform", item))
+    return build_cache.build_once(*options, *platforms, optimised=True)
 
 
 @pytest.fixture(params=["python", "native"])

@@ -17,7 +17,7 @@ from benchmarks.symmetry.study import Model, Options, run_model
 LABELS = [model_label(path) for path in all_models()]
 KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP, REVOLUTIONS)
 SHIPPED = {
-    PYTHON: lambda: build_cache.build_once("fmi2"),
+    PYTHON: build_cache.build_once,
     NATIVE: build_native_fmus,
     FMI3: build_fmi3_fmus,
 }

@@ -6,7 +6,7 @@ import web_page
 
 @pytest.fixture(scope="module")
 def page_in_browser(browser):
-    return web_page.Page(browser, web_page.build_page("web"))
+    return web_page.Page(browser, web_page.build_page())
 
 
 @pytest.fixture

@@ -32,7 +32,7 @@ def test_a_phase_angle_is_no_driver(name, driver):
 @pytest.mark.campaign
 def test_the_models_of_fmus_more_run_on_a_second_page(quiet):
     """It leaves index.html, the page of the shipped models, as it is."""
-    page = web_page.Page(quiet, web_page.build_page("web-more", "--more", file="more.html"))
+    page = web_page.Page(quiet, web_page.build_page("--more", file="more.html"))
     assert [file.name for file in page.file.parent.iterdir()] == ["more.html"]
     page.open()
     assert page.run("[...app.library.models.keys()]") == more_model_names()
@@ -62,7 +62,7 @@ def test_user_models_run_on_a_page_of_their_own(quiet, tmp_path):
     files = [ROOT / name for name in ("tests/example_models/rotor_brake.py", "fmus/more/stacked.py")]
     curve = tmp_path / "curve.py"
     curve.write_text(CURVE)
-    page = web_page.Page(quiet, web_page.build_page("users", *map(str, (*files, curve)), "--method", "ode45"))
+    page = web_page.Page(quiet, web_page.build_page(*files, curve, "--method", "ode45"))
     page.open()  # without the models of the stories, it opens with the panel
     assert page.run("document.getElementById('stories')") is None
     assert page.run("document.querySelector('h1').textContent") == "Dry friction, live"
@@ -92,7 +92,7 @@ def check_table_values(page):
 def test_several_contacts_are_shaded_and_named_each(quiet):
     """Bands, force panels and events of the lower block, on which two contacts act; its input is plotted if it acts."""
     files = [ROOT / name for name in ("tests/example_models/rotor_brake.py", "fmus/more/stacked.py")]
-    page = web_page.Page(quiet, web_page.build_page("users", *map(str, files), "--method", "ode45"))
+    page = web_page.Page(quiet, web_page.build_page(*files, "--method", "ode45"))
     page.open(".model=stacked&F_ext=3")
     content = "app.plots.get({!r}).panel.content"
     for key, rows in ((".sticking", ["F_1", "F_2"]), ("x_1", ["F_1", "F_2"]), ("F_1", ["F_1"]), ("F_2", ["F_2"])):

@@ -18,15 +18,15 @@ SHIFTS = (
 )
 
 
-def build_page(name, *words, file="index.html"):
-    """Build the page in a folder of its own and return its file."""
+def build_page(*words, file="index.html"):
+    """Build the page with these arguments, which may be model files, and return its file."""
     pytest.importorskip("ziglang", reason="the page is compiled by the package ziglang: pip install -e '.[native]'")
 
     def make(folder):
-        done = commands.build("--web", *words, "--out", folder)
+        done = commands.build("--web", *map(str, words), "--out", folder)
         assert done.returncode == 0, done.stderr
 
-    return build_cache.keep_build(name, make) / file
+    return build_cache.keep_build(build_cache.name_build("page", *words), make) / file
 
 
 class Page:
