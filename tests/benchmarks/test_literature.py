@@ -16,7 +16,7 @@ from benchmarks.literature.study import (
 from harness.references import peer_solvers
 from harness.simulation.embedded_model import EmbeddedModel, load_more_model, method_numbers
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.campaign
 
 BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
 
@@ -38,14 +38,12 @@ def test_the_reference_end_of_the_block_is_the_published_one():
     assert (round(x, 7), round(v, 7)) == BELT
 
 
-@pytest.mark.campaign
 def test_the_reference_end_of_the_block_agrees_with_two_methods():
     for method, rtol in (("DOP853", 3e-14), ("Radau", 1e-11)):
         answer = peer_solvers.solve("scipy", method, BeltBlock(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
         assert answer.states[-1] == pytest.approx(study.BLOCK_ON_BELT, abs=2e-11)
 
 
-@pytest.mark.campaign
 @pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas"])
 def test_every_method_of_the_runtime_reaches_the_end_of_the_block(rows, method):
     assert method in method_numbers(load_more_model("belt"))
@@ -54,7 +52,6 @@ def test_every_method_of_the_runtime_reaches_the_end_of_the_block(rows, method):
     assert row.evaluations < 10_000
 
 
-@pytest.mark.campaign
 def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
     run = EmbeddedModel.create(load_more_model("belt"), {}, "dop853", 1e-11)
     truth = peer_solvers.solve("scipy", "DOP853", BeltBlock(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
@@ -63,7 +60,6 @@ def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
     assert [t for t, _ in events] == pytest.approx([t for t, _ in truth], abs=1e-8)
 
 
-@pytest.mark.campaign
 def test_smoothing_loses_four_digits_at_more_cost_than_event_location(rows):
     smooth = next(row for row in rows("block on a belt", "scipy, arctan(1e6 v)") if row.method == "LSODA")
     located = next(row for row in rows("block on a belt", study.RUNTIME) if row.method == "ode45")

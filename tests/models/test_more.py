@@ -17,9 +17,9 @@ from harness.references.certified_reference import event_time_error, load_refere
 MORE = ROOT / "fmus" / "more"
 OSCILLATORS = [name for name in more_model_names() if name != "spring"]  # which only couples FMUs
 KINDS = {"python": (), "native": ("--native",), "fmi3": ("--fmi", "3")}
-FMI3 = ("belt", "joint", "lugre", "spring", "puck")  # one contact, coupled, none, none that sticks, in a plane
-EVERY_KIND = [  # in CI, FMUs of FMI 3.0 are those of FMI3: the C code of a model is that of its native FMU
-    pytest.param(name, kind, marks=pytest.mark.campaign if kind == "fmi3" and name not in FMI3 else ())
+IN_CI = ("belt", "joint", "lugre", "spring", "puck")  # one contact, coupled, none, none that sticks, in a plane
+EVERY_KIND = [
+    pytest.param(name, kind, marks=pytest.mark.campaign if kind != "python" and name not in IN_CI else ())
     for name in more_model_names()
     for kind in KINDS
 ]
@@ -29,13 +29,10 @@ LAWS |= {"coulomb": (3, event_located.CoulombBelt)}
 
 def built(name, kind="python"):
     """Return the FMU of a model of fmus/more."""
-    platform = []
-    if kind != "python":
-        require_compiler()
-        platform = ["--platform", "linux64"]
-    if kind == "fmi3":
-        return build_once(name, *KINDS[kind], *platform) / f"{name}.fmu"
-    return build_once("--more", *KINDS[kind], *platform) / f"{name}.fmu"
+    if kind == "python":
+        return build_once("--more") / f"{name}.fmu"
+    require_compiler()
+    return build_once(name, *KINDS[kind], "--platform", "linux64") / f"{name}.fmu"
 
 
 def states(name):

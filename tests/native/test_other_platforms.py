@@ -28,6 +28,7 @@ from native_host import (
     value_references,
     version_and_guid,
 )
+from variants import campaign_after
 
 from fmus.packaging import native
 from fmus.packaging.native.binaries import PLATFORMS, compile_binaries, find_compiler
@@ -71,7 +72,7 @@ def is_steady(case):
 STEADY = [case for case in CASES if is_steady(case)]
 
 
-@pytest.fixture(scope="module", params=MACHINES)
+@pytest.fixture(scope="module", params=campaign_after(1, MACHINES))
 def machine(request):
     """A platform, a function that returns the command to start a host there, and its environment."""
     emulator, *words = MACHINES[request.param]
