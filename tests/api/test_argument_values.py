@@ -92,8 +92,8 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "lenient": FLAG,
         "progress": {"type"},
     },
-    "orbit": {"values": {"{}"}, "inputs": {"{}"}, "progress": {"type"}},
-    "map_motions": {"values": {"{}"}, "inputs": {"{}"}, "progress": {"type"}},
+    "orbit": {"values": {"{}"}, "inputs": {"{}"}, "section": {"'x'"}, "progress": {"type"}},
+    "map_motions": {"values": {"{}"}, "inputs": {"{}"}, "section": {"'x'"}, "progress": {"type"}},
     "load_result": {},
     "measure": {"unit": {"'x'", "'8'", "long text"}},
     "read_record": {

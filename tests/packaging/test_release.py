@@ -5,7 +5,6 @@ from io import BytesIO
 from zipfile import ZipFile
 
 import pytest
-from build_cache import ROOT
 from click.testing import CliRunner
 from fmpy import read_model_description
 
@@ -13,15 +12,13 @@ import build_fmus
 from fmus.compiler import __version__
 from fmus.page import release
 
-SCENES = sorted((ROOT / "harness" / "scenes").glob("*.toml"))
-
 
 @pytest.fixture
 def build_release(tmp_path_factory, monkeypatch):
     """Return a function that builds a release with two small models only, which saves minutes."""
     monkeypatch.setattr(release, "model_names", lambda: ["smd"])
     monkeypatch.setattr(release, "more_model_names", lambda: ["forced"])
-    return lambda: release.build_release(tmp_path_factory.mktemp("release"), SCENES).read_bytes()
+    return lambda: release.build_release(tmp_path_factory.mktemp("release")).read_bytes()
 
 
 @pytest.mark.campaign

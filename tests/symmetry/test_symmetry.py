@@ -30,10 +30,10 @@ FEW_MODELS = {
 }
 PERIODIC = {"stickslip": 1e5, "joint": 700.0, "forced": 300.0, "sleds": 1000.0}  # duration in s
 HAVE_ANGLES = ("pendulum",)  # set by a parameter; test_revolutions.py has further models
-HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start value; no frame: no state is a velocity
+HAVE_NONE = {  # no mirror image: a constant of one sign, a number as start value, or a slip in a plane without a sign
     UNITS: ("servo",),  # a table holds numbers with units
-    MIRROR: ("bumper", "clutch", "forced", "joint", "lift", "viscous_pendulum"),
-    FRAME: ("spring",),
+    MIRROR: ("bumper", "clutch", "forced", "joint", "lift", "puck", "viscous_pendulum"),
+    FRAME: ("spring",),  # no state is a velocity
 }
 
 
