@@ -11,7 +11,7 @@ from pathlib import Path
 
 CAMPAIGNS = {  # name -> command, after the path of Python
     "tests": ("-m", "pytest", "-q", "-m", "campaign"),
-    "random_campaign": ("-m", "benchmarks.campaigns.random_campaign", "--structures", "40", "--values", "50"),
+    "random_campaign": ("-m", "benchmarks.campaigns.random_campaign", "--structures", "20", "--values", "25"),
     "planar_contacts": ("-m", "benchmarks.campaigns.planar_contacts", "--scenes", "1000", "--driven", "200"),
     "fit_campaign": ("-m", "benchmarks.campaigns.fit_campaign", "--seed", "58", "--records", "200"),
     "interval_coverage": ("-m", "benchmarks.campaigns.interval_coverage", "100"),

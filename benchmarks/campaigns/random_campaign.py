@@ -1,6 +1,6 @@
 """Run random models with dry friction and compare them with independent_contacts.py.
 
-    python -m benchmarks.campaigns.random_campaign --structures 40 --values 50
+    python -m benchmarks.campaigns.random_campaign --structures 20 --values 25
 
 prints a table of failures with the seeds that reproduce them, and
 
@@ -397,8 +397,8 @@ def show(worker, paths, structure, seed, method, rtol):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--structures", type=int, default=40, help="number of model files")
-    parser.add_argument("--values", type=int, default=50, help="number of parameter sets for each")
+    parser.add_argument("--structures", type=int, default=20, help="number of model files")
+    parser.add_argument("--values", type=int, default=25, help="number of parameter sets for each")
     parser.add_argument("--first", type=int, default=0, help="seed of the first model file")
     parser.add_argument("--first-values", type=int, default=0, help="seed of the first parameter set")
     parser.add_argument("--folder", type=Path, default=Path("/tmp/random-campaign"), help="for FMUs and references")
