@@ -144,5 +144,5 @@ def launch(worker, fmus):
 
     yield launch
     for instance in instances:
-        if worker.alive and not instance.freed:
+        if worker.alive and not instance.is_freed:
             instance.free()

@@ -155,7 +155,7 @@ if __name__ == "__main__":
     import scipy.optimize
     import xarray
 
-    IMPORTED = fmpy, matplotlib.figure, scipy.integrate, scipy.optimize, xarray  # once, before the forks
-    root, *chosen = sys.argv[1:]
-    for result in run(root, chosen or VALUES):
+    LIBRARIES = fmpy, matplotlib.figure, scipy.integrate, scipy.optimize, xarray  # once, before the forks
+    root, *value_names = sys.argv[1:]
+    for result in run(root, value_names or VALUES):
         print(json.dumps(result), flush=True)

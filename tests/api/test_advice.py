@@ -44,9 +44,9 @@ def test_an_interrupted_sweep_says_what_becomes_of_its_runs(in_workspace):
 def test_a_missing_fmu_names_the_command_that_builds_it(fmu, arguments, tmp_path):
     (tmp_path / "two words").mkdir()
     (tmp_path / "two words" / "cart.py").touch()
-    done = commands.harness(tmp_path, "run", fmu)
+    result = commands.harness(tmp_path, "run", fmu)
     remedy = "" if arguments is None else f"build it with `friction-fmus build{arguments}`, or "
-    assert done.stderr == f"Error: there is no {fmu}: {remedy}specify another file\n"
+    assert result.stderr == f"Error: there is no {fmu}: {remedy}specify another file\n"
 
 
 def test_an_fmu_in_another_folder_is_built_as_the_message_says(tmp_path):
@@ -58,8 +58,8 @@ def test_an_fmu_in_another_folder_is_built_as_the_message_says(tmp_path):
 @pytest.mark.parametrize("native", [(), pytest.param(("--native",), marks=pytest.mark.campaign)])
 def test_an_unknown_platform_lists_those_that_exist(native, tmp_path):
     message = commands.build("smd", "--platform", "vax", *native, "--out", tmp_path).stderr
-    listed = re.search(r"choose from (\w+)", message)[1]
-    assert commands.build("smd", "--platform", listed, *native, "--out", tmp_path).returncode == 0
+    platform = re.search(r"choose from (\w+)", message)[1]
+    assert commands.build("smd", "--platform", platform, *native, "--out", tmp_path).returncode == 0
 
 
 @pytest.mark.parametrize("exponent", [-10, -3, -1, -0.5, 0, 0.5, 1, 1.5, 2, 2.5, 3.5, 7, 10, 11, -1.5, 1.7, math.pi])

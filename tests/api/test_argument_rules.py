@@ -67,10 +67,10 @@ def test_an_argument_names_its_rule(rule):
         for value in INVALID.get(rule, [1j, object()]):
             if value is None and is_optional:
                 continue
-            with pytest.raises(harness.HarnessError) as refused:
+            with pytest.raises(harness.HarnessError) as refusal:
                 function(**argument_values.CALLS[name] | {argument: value})
-            message = str(refused.value)
-            whole = f"{argument} = " in message and f" must be {rule}" in message
-            part = message.startswith((f"{argument}: ", "unknown "))  # of a mapping or a row; one of several
-            assert whole or part, (name, argument, value, message)
+            message = str(refusal.value)
+            names_argument = f"{argument} = " in message and f" must be {rule}" in message
+            names_part = message.startswith((f"{argument}: ", "unknown "))  # of a mapping or a row; one of several
+            assert names_argument or names_part, (name, argument, value, message)
             assert "\n" not in message

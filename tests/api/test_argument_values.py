@@ -22,7 +22,7 @@ ABOVE_ZERO = {"0.5", "1e300", "0-d array"}
 FINITE = {"0", "-1", *ABOVE_ZERO}
 FLAG = {"True", "np.bool"}
 NOTHING = {"[]", "{}"}  # of names
-ACCEPTED = {  # arguments by function, and the values that they may have; None as well if it is the default
+ACCEPTED_VALUES = {  # arguments by function, and the values that they may have; None as well if it is the default
     "simulate": {
         "values": {"{}"},
         "start": FINITE,
@@ -108,7 +108,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
 
 def test_all_functions_are_called():
     functions = {name for name in harness.__all__ if inspect.isfunction(getattr(harness, name))}
-    assert functions == set(ACCEPTED) == set(argument_values.CALLS)
+    assert functions == set(ACCEPTED_VALUES) == set(argument_values.CALLS)
 
 
 @pytest.mark.campaign
@@ -118,25 +118,27 @@ def test_a_value_is_used_or_refused_in_one_sentence(fmus, tmp_path):
     (tmp_path / "native").symlink_to(build_native_fmus())
     program = [sys.executable, Path(__file__).with_name("argument_values.py"), tmp_path]
     environment = os.environ | {"PYTHONPATH": str(commands.ROOT)}
-    done = subprocess.run(program, env=environment, capture_output=True, text=True, timeout=3600)
-    assert done.returncode == 0, done.stderr
-    accepted, failures = defaultdict(set), []
+    result = subprocess.run(program, env=environment, capture_output=True, text=True, timeout=3600)
+    assert result.returncode == 0, result.stderr
+    accepted_values, failures = defaultdict(set), []
     parameters = {
         (function, name): parameter
-        for function in ACCEPTED
+        for function in ACCEPTED_VALUES
         for name, parameter in inspect.signature(getattr(harness, function)).parameters.items()
     }
-    results = [json.loads(line) for line in done.stdout.splitlines()]
+    results = [json.loads(line) for line in result.stdout.splitlines()]
     assert len(results) == len(parameters) * len(argument_values.VALUES)
     for function, argument, value, outcome in results:
         raised_by_user = (argument, value) == ("progress", "function") and outcome.startswith(
             "TypeError: object of type"
         )
         if outcome == "accepted":
-            accepted[function, argument].add(value)
+            accepted_values[function, argument].add(value)
         elif not raised_by_user and (not outcome.startswith("refused: ") or "\n" in outcome):
             failures.append((function, argument, value, outcome))
     assert failures == []
     for (function, argument), parameter in parameters.items():
         optional = {"None"} if parameter.default is None else set()
-        assert accepted[function, argument] <= ACCEPTED[function].get(argument, set()) | optional, argument
+        assert accepted_values[function, argument] <= ACCEPTED_VALUES[function].get(argument, set()) | optional, (
+            argument
+        )

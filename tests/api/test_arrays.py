@@ -40,16 +40,16 @@ def test_numbers_of_any_type_are_taken_as_they_are(user_folder, monkeypatch, kin
 
 def test_numbers_that_a_mask_hides_are_missing(user_folder, monkeypatch):
     monkeypatch.chdir(user_folder)
-    hidden = np.ma.array([0.0, 0.1, 9e36], mask=[False, False, True])
+    masked_values = np.ma.array([0.0, 0.1, 9e36], mask=[False, False, True])
     for function, arguments in (
-        (harness.simulate, {"times": hidden}),
-        (harness.simulate, {"inputs": {"time": [0.0, 0.1, 0.2], "F_ext": hidden}}),
-        (harness.sweep, {"grid": {"f": hidden}}),
+        (harness.simulate, {"times": masked_values}),
+        (harness.simulate, {"inputs": {"time": [0.0, 0.1, 0.2], "F_ext": masked_values}}),
+        (harness.sweep, {"grid": {"f": masked_values}}),
     ):
         with pytest.raises(harness.SceneError, match=r"nan at index 2|not a finite number"):
             function("coulomb", **arguments)
     run = harness.simulate("coulomb", times=[0.0, 0.1, 0.2])
-    result = harness.compare(run, {"t": [0.0, 0.1, 0.2], "x": hidden})
+    result = harness.compare(run, {"t": [0.0, 0.1, 0.2], "x": masked_values})
     assert "x is not a finite number at t = 0.2 s" in str(result)
     t = np.linspace(0.0, 6.0, 121)
     x = np.ma.array(np.exp(-0.1 * t) * np.cos(6.0 * t), mask=np.arange(121) % 20 == 7)

@@ -22,12 +22,12 @@ def test_a_description_has_every_variable_of_the_fmu_with_its_unit_and_default(f
         None if item.unit == "1" else item.unit for item in expected.modelVariables
     ]
     for item in expected.modelVariables:
-        found = description[item.name]
+        variable = description[item.name]
         if item.type == "Enumeration":
-            assert found.choices == tuple(choice.name for choice in item.declaredType.items)
-            assert found.start == found.choices[[c.value for c in item.declaredType.items].index(item.start)]
+            assert variable.choices == tuple(choice.name for choice in item.declaredType.items)
+            assert variable.start == variable.choices[[c.value for c in item.declaredType.items].index(item.start)]
         elif item.start is not None:
-            assert found.start == float(item.start)
+            assert variable.start == float(item.start)
     text = str(description)
     assert all(f"\n{item.name} " in text for item in expected.modelVariables)
     assert description["solver.rtol"].range == "from 0 to below 1"
@@ -35,16 +35,22 @@ def test_a_description_has_every_variable_of_the_fmu_with_its_unit_and_default(f
 
 
 def test_laws_and_methods_are_those_of_the_contract(fmus):
-    found = {model: harness.describe(fmus / f"{model}.fmu") for model in MODELS}
-    assert {model: item.laws for model, item in found.items()} == {
+    descriptions = {model: harness.describe(fmus / f"{model}.fmu") for model in MODELS}
+    assert {model: item.laws for model, item in descriptions.items()} == {
         "smd": (),
         "coulomb": ("hybrid", "sign"),
         "stickslip": ("hybrid", "threshold"),
         "pacejka": (),
         "pendulum": ("hybrid", "sign"),
     }
-    assert [item["solver.method"].start for item in found.values()] == ["exact", "exact", "exact", "radau9", "dop853"]
-    assert all("ode23" in item.methods for item in found.values())
+    assert [item["solver.method"].start for item in descriptions.values()] == [
+        "exact",
+        "exact",
+        "exact",
+        "radau9",
+        "dop853",
+    ]
+    assert all("ode23" in item.methods for item in descriptions.values())
 
 
 def test_a_description_is_one_line_a_table_and_html(fmus):
@@ -61,9 +67,9 @@ def test_a_description_is_one_line_a_table_and_html(fmus):
 @pytest.mark.parametrize("name", ["Arrays", "Midpoint", "ModelExchangeOnly", "Fmi3Midpoint"])
 def test_the_command_describes_any_fmu(tmp_path, name):
     path = external_fmus.build_external_fmus() / f"{name}.fmu"
-    done = commands.harness(tmp_path, "info", path, "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    data, description = json.loads(done.stdout), harness.describe(path)
+    result = commands.harness(tmp_path, "info", path, "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+    data, description = json.loads(result.stdout), harness.describe(path)
     assert [item["name"] for item in data["variables"]] == [item.name for item in description.variables]
     assert data["interfaces"] == list(description.interfaces)
     text = commands.harness(tmp_path, "info", path, COLUMNS="80").stdout
@@ -79,10 +85,10 @@ def test_what_is_no_model_and_no_fmu_is_refused_in_one_sentence(tmp_path):
         ("none.fmu", "none.fmu"),
         ("text.fmu", "cannot be read"),
     ):
-        done = commands.harness(tmp_path, "info", source)
-        assert done.returncode in (1, 2)
-        assert words in done.stderr
-        assert done.stderr.count("\n") == 1
+        result = commands.harness(tmp_path, "info", source)
+        assert result.returncode in (1, 2)
+        assert words in result.stderr
+        assert result.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"{}", b'{"tables": 1}', b"\xff"])

@@ -36,9 +36,9 @@ def test_an_option_in_a_message_is_one_of_a_command_and_an_argument_of_the_api(n
 
 def test_an_fmu_that_violates_the_standard_runs_in_python_as_the_message_says(external_fmu_folder):
     fmu = external_fmu_folder / "NonConforming.fmu"
-    with pytest.raises(harness.HarnessError, match=r"to try to run it, use lenient=True") as caught:
+    with pytest.raises(harness.HarnessError, match=r"to try to run it, use lenient=True") as error:
         harness.simulate(fmu)
-    functions = re.findall(r"harness\.(\w+)", str(caught.value))
+    functions = re.findall(r"harness\.(\w+)", str(error.value))
     assert functions == ["simulate", "compare", "sweep"]
     assert all("lenient" in inspect.signature(getattr(harness, name)).parameters for name in functions)
     assert len(harness.simulate(fmu, lenient=True).time) > 1

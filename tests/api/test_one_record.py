@@ -82,16 +82,16 @@ def test_options_of_a_record_hold_in_every_function(files, tmp_path):
     pandas.DataFrame({"t [s]": T, "other": T, "laser": 1e3 * X}).to_csv(path, index=False)
     record = read_record(path, column="laser", unit="mm", begin=0.5, end=4.0)
     assert (record.t[0], record.t[-1], record.unit) == (0.5, 4.0, "m")
-    whole = read_record(files / "decay.csv").select(0.5, 4.0)
-    assert np.array_equal(record.x, whole.x)
+    selection = read_record(files / "decay.csv").select(0.5, 4.0)
+    assert np.array_equal(record.x, selection.x)
     assert numbers(identify_decay(record)) == numbers(identify_decay(files / "decay.csv", begin=0.5, end=4.0))
     free = {"k": (50, 500), "x0": (-1, 1), "v0": (-5, 5)}
-    fits = [harness.fit(build_native_fmus() / "smd.fmu", one, free) for one in (record, record.select(0.5, 1.5))]
-    assert [(one.records[0].t[0], one.records[0].t[-1]) for one in fits] == [(0.5, 4.0), (0.5, 1.5)]
+    fits = [harness.fit(build_native_fmus() / "smd.fmu", part, free) for part in (record, record.select(0.5, 1.5))]
+    assert [(fit.records[0].t[0], fit.records[0].t[-1]) for fit in fits] == [(0.5, 4.0), (0.5, 1.5)]
     assert np.ptp(fits[0].records[0].y) == pytest.approx(np.ptp(record.x))
     assert identify_decay(record, end=3.0).record.t[-1] <= 3.0
-    two = harness.compare(record, harness.Signals(T, {"laser": 1e3 * X}, {"laser": ""}))
-    assert two.to_pandas()["largest"].tolist() == [0.0]
+    comparison = harness.compare(record, harness.Signals(T, {"laser": 1e3 * X}, {"laser": ""}))
+    assert comparison.to_pandas()["largest"].tolist() == [0.0]
 
 
 def test_a_record_that_nothing_can_be_read_from_is_refused_at_once(tmp_path):

@@ -30,16 +30,16 @@ harness.simulate("coulomb", stop=2.0{options})
 )
 def test_a_bar_is_shown_in_a_terminal_for_long_calls(workspace, terminal, delay, options, is_shown):
     script = SCRIPT.format(terminal=terminal, delay=delay, options=options)
-    done = commands.run_python(workspace, "-c", script, TERM="xterm", COLUMNS="80")
-    assert (done.returncode, done.stdout) == (0, "")
-    assert ("simulate" in done.stderr) == is_shown
-    assert is_shown or done.stderr == ""
+    result = commands.run_python(workspace, "-c", script, TERM="xterm", COLUMNS="80")
+    assert (result.returncode, result.stdout) == (0, "")
+    assert ("simulate" in result.stderr) == is_shown
+    assert is_shown or result.stderr == ""
 
 
 def test_a_bar_ends_with_a_call_that_fails(workspace):
     script = SCRIPT.format(terminal=True, delay=0.0, options=", inputs={'time': [0.0, 1.0], 'F_ext': [1e308, 1e308]}")
-    done = commands.run_python(workspace, "-c", script, TERM="xterm", COLUMNS="80")
-    assert done.returncode == 1
-    bar, _, error = done.stderr.partition("Traceback")
+    result = commands.run_python(workspace, "-c", script, TERM="xterm", COLUMNS="80")
+    assert result.returncode == 1
+    bar, _, error = result.stderr.partition("Traceback")
     assert "simulate" in bar
     assert "HarnessError" in error

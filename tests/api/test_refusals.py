@@ -154,11 +154,11 @@ def test_an_invalid_argument_is_one_sentence(user_folder, record, monkeypatch, f
     pytest.importorskip("xarray")
     monkeypatch.chdir(user_folder)
     records = {"records": record} if function is harness.fit else {}
-    with pytest.raises(harness.HarnessError) as refused:
+    with pytest.raises(harness.HarnessError) as refusal:
         function(**(arguments | records | changes))
-    assert message in str(refused.value)
-    assert "\n" not in str(refused.value)
-    assert "--" not in str(refused.value)
+    assert message in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert "--" not in str(refusal.value)
 
 
 def test_remarks_name_arguments_of_the_function(tmp_path):

@@ -18,8 +18,8 @@ pytestmark = pytest.mark.usefixtures("in_workspace")
 
 def test_public_names_are_complete_and_documented():
     tree = ast.parse(inspect.getsource(harness))
-    imported = {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-    public = {name for name in imported if not name.startswith("_")} - {"import_module", "TYPE_CHECKING", "Any"}
+    imported_names = {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    public = {name for name in imported_names if not name.startswith("_")} - {"import_module", "TYPE_CHECKING", "Any"}
     assert {*harness.__all__} == public | {*harness.TYPES, "__version__"}
     for name in harness.__all__:
         value = getattr(harness, name)
@@ -45,15 +45,15 @@ def test_a_stored_run_loads_bit_for_bit(start):
     Path("late.toml").write_text(text)
     run = harness.simulate("late.toml")
     run.save("saved")
-    loaded = harness.load_result("saved")
-    assert {*loaded.columns} == {*run.columns}
+    loaded_run = harness.load_result("saved")
+    assert {*loaded_run.columns} == {*run.columns}
     for name in run.columns:
-        assert np.array_equal(loaded[name], run[name])
-    assert loaded.parameters == run.parameters
-    assert loaded.spec == run.spec
-    assert loaded.units == run.units
-    assert np.array_equal(loaded.events.t, run.events.t)
-    assert np.array_equal(loaded.steps.t, run.steps.t)
+        assert np.array_equal(loaded_run[name], run[name])
+    assert loaded_run.parameters == run.parameters
+    assert loaded_run.spec == run.spec
+    assert loaded_run.units == run.units
+    assert np.array_equal(loaded_run.events.t, run.events.t)
+    assert np.array_equal(loaded_run.steps.t, run.steps.t)
 
 
 def test_saving_does_not_overwrite_other_files(tmp_path):
@@ -82,24 +82,24 @@ def test_a_fit_and_a_comparison_take_any_record():
     fmu = build_native_fmus() / "coulomb.fmu"  # for speed
     run = harness.simulate("coulomb", stop=2.0, interval=0.01, outputs=["x"])
     deltas = pandas.to_timedelta(run.time, unit="s")
-    named = {
+    named_records = {
         "run": run,
         "frame": run.to_pandas(),
         "mapping": {"t": run.time, "x": run["x"]},
         "series": pandas.Series(run["x"], run.time, name="x"),
         "deltas": pandas.Series(1000 * run["x"], deltas, name="x [mm]"),
     }
-    for name, record in named.items():
+    for name, record in named_records.items():
         comparison = harness.compare(run, record)
         assert comparison.worst < 1e-12, name
         assert comparison.differences[0].name == "x", name
-    unnamed = {"pair": {"records": (run.time, run["x"])}, "samples": {"records": run["x"], "rate": 100.0}}
-    calls = {name: {"records": record} for name, record in named.items()} | unnamed
+    unnamed_records = {"pair": {"records": (run.time, run["x"])}, "samples": {"records": run["x"], "rate": 100.0}}
+    calls = {name: {"records": record} for name, record in named_records.items()} | unnamed_records
     for name, arguments in calls.items():
         result = harness.fit(fmu, free=["f"], observe="x", **arguments)
         assert result["f"].value == pytest.approx(0.5, rel=1e-3), name
-    both = harness.fit(fmu, [(run.time, run["x"]), named["series"]], ["f"], observe="x")
-    assert len(both.records) == 2
+    joint_fit = harness.fit(fmu, [(run.time, run["x"]), named_records["series"]], ["f"], observe="x")
+    assert len(joint_fit.records) == 2
 
 
 def test_a_run_starts_at_a_given_time():
@@ -180,8 +180,8 @@ def test_the_tolerance_of_a_sweep_is_that_of_its_runs():
 def test_samples_are_reproducible_and_stored():
     pytest.importorskip("xarray")
     first = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3, folder="kept")
-    repeated = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3)
-    assert first.equals(repeated.data)
+    repeated_sweep = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3)
+    assert first.equals(repeated_sweep.data)
     (folder,) = (path for path in Path("kept/sweep").iterdir() if not path.name.startswith("."))
     assert harness.load_result(folder).equals(first.data)
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("in_workspace")
 SMD = {"m": 1.0, "k": 157.9, "c": 2.0}
 
 
-def driven(t, force):
+def driven_positions(t, force):
     """Return the positions of smd from rest under a force, by scipy."""
 
     def rates(t, y):
@@ -68,15 +68,15 @@ def test_an_interval_ends_with_the_stop():
     ids=["python", "fmi2", "fmi3"],
 )
 def test_a_refusal_states_whether_a_bound_is_excluded(folder):
-    for values, allowed in (
+    for values, message in (
         ({"m": 0.0}, "m = 0.0 is outside its range; allowed: above 0.0 kg"),
         ({"m": -1.0}, "m = -1.0 is outside its range; allowed: above 0.0 kg"),
         ({"k": -1.0}, "k = -1.0 is outside its range; allowed: at least 0.0 N/m"),
         ({"solver.rtol": 1.0}, "solver.rtol = 1.0 is outside its range; allowed: at least 0.0 and below 1.0"),
     ):
-        with pytest.raises(harness.SceneError) as refused:
+        with pytest.raises(harness.SceneError) as refusal:
             harness.simulate(folder() / "smd.fmu", values)
-        assert str(refused.value) == allowed
+        assert str(refusal.value) == message
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_input_signals_drive_every_interface(folder, interface):
     start = {"x0": 0.0, "v0": 0.0}
     options = {"interface": interface, "rtol": 1e-6, "interval": 0.02}
     run = harness.simulate(folder() / "smd.fmu", start, stop=2.0, inputs=table, **options)
-    expected = driven(run.time, lambda t: np.interp(t, *table.values()))
+    expected = driven_positions(run.time, lambda t: np.interp(t, *table.values()))
     assert np.abs(run["x"] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
@@ -131,9 +131,9 @@ def test_outputs_at_a_jump_have_the_input_after_it(interface, at_jump):
     """Model exchange shows both sides, because a jump is an event there."""
     table = {"time": [0.0, 0.0, 1.0, 1.0, 4.0], "F_ext": [9.0, 0.0, 0.0, 5.0, 5.0]}
     options = {"source": native_fmus.build_native_fmus() / "smd.fmu", "inputs": table, "interface": interface}
-    run, sampled = harness.simulate(**options), harness.simulate(**options, times=[0.5, 1.0, 1.5])
+    run, sampled_run = harness.simulate(**options), harness.simulate(**options, times=[0.5, 1.0, 1.5])
     force, sampled_force = (
-        SMD["m"] * result["a"] + SMD["c"] * result["v"] + SMD["k"] * result["x"] for result in (run, sampled)
+        SMD["m"] * result["a"] + SMD["c"] * result["v"] + SMD["k"] * result["x"] for result in (run, sampled_run)
     )
     assert sampled_force == pytest.approx([0.0, 5.0, 5.0], abs=1e-12)
     assert force[run.time == 1.0] == pytest.approx(at_jump, abs=1e-12)
@@ -162,9 +162,9 @@ def test_inputs_are_followed_between_the_times_of_the_interval(interval):
 def test_a_data_frame_drives_inputs():
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame({"F_ext": [0.0, 2.0]}, index=pandas.Index([0.0, 4.0], name="time"))
-    ramp = harness.simulate("coulomb", inputs=table, interval=0.5)
-    same = harness.simulate("coulomb", inputs={"time": [0.0, 4.0], "F_ext": [0.0, 2.0]}, interval=0.5)
-    assert np.array_equal(ramp["x"], same["x"])
+    frame_run = harness.simulate("coulomb", inputs=table, interval=0.5)
+    mapping_run = harness.simulate("coulomb", inputs={"time": [0.0, 4.0], "F_ext": [0.0, 2.0]}, interval=0.5)
+    assert np.array_equal(frame_run["x"], mapping_run["x"])
 
 
 def test_results_convert_with_their_units():
@@ -228,16 +228,16 @@ def test_a_tolerance_acts_on_every_method(in_workspace, method):
     for rtol in (1e-2, 1e-9):
         run = harness.simulate("pacejka", {"x_m": 0.1}, stop=2.0, method=method, rtol=rtol)
         grid, values = {"x_m": [0.1]}, {"solver.method": method}
-        swept = harness.sweep("pacejka", grid, values=values, measures=["steps"], stop=2.0, rtol=rtol)
-        assert float(swept["steps"][0]) == run.statistics.steps
+        data = harness.sweep("pacejka", grid, values=values, measures=["steps"], stop=2.0, rtol=rtol)
+        assert float(data["steps"][0]) == run.statistics.steps
         steps.append(run.statistics.steps)
     assert steps[0] < steps[1]
 
 
 def test_the_tolerance_of_a_comparison_acts_on_fmus_and_scenes(in_workspace):
-    recorded = harness.simulate("pacejka", stop=1.0)
+    recorded_run = harness.simulate("pacejka", stop=1.0)
     for source in ("fmus/pacejka.fmu", "pacejka"):
-        loose, tight = (harness.compare(source, recorded, stop=1.0, rtol=rtol).one for rtol in (1e-2, 1e-9))
+        loose, tight = (harness.compare(source, recorded_run, stop=1.0, rtol=rtol).one for rtol in (1e-2, 1e-9))
         assert loose.statistics.steps < tight.statistics.steps
-    both = harness.compare("fmus/smd.fmu", "fmus/pacejka.fmu", stop=1.0, rtol=1e-9)
-    assert both.two.parameters["solver.rtol"] == 1e-9
+    comparison = harness.compare("fmus/smd.fmu", "fmus/pacejka.fmu", stop=1.0, rtol=1e-9)
+    assert comparison.two.parameters["solver.rtol"] == 1e-9

@@ -61,11 +61,11 @@ def test_a_stored_run_holds_its_specification_and_values(call):
             source = source.format(**{name: build()})
     run = harness.simulate(**arguments | {"source": source})
     run.save("saved")
-    stored = harness.load_result("saved")
-    assert pickle.loads(pickle.dumps(run.spec)) == run.spec == stored.spec
-    assert np.array_equal(stored.time, run.time)
+    stored_run = harness.load_result("saved")
+    assert pickle.loads(pickle.dumps(run.spec)) == run.spec == stored_run.spec
+    assert np.array_equal(stored_run.time, run.time)
     for name in run.columns:
-        assert np.array_equal(stored[name], run[name]), name
+        assert np.array_equal(stored_run[name], run[name]), name
 
 
 def test_a_stored_specification_names_enumerations_by_their_labels():

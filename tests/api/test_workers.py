@@ -18,9 +18,9 @@ def test_a_script_without_a_main_guard_sweeps_twice_and_leaves_no_files(workspac
     (workspace / "temporary").mkdir()
     lines = [f"print(float({SWEEP}['final_x'][0]))\n" for _ in range(2)]
     (workspace / "script.py").write_text("import harness\n\n" + "".join(lines))
-    done = commands.run_python(workspace, "script.py", PYTHONPATH=str(ROOT), TMPDIR=str(workspace / "temporary"))
-    assert (done.returncode, done.stderr) == (0, "")
-    first, second = done.stdout.split()
+    result = commands.run_python(workspace, "script.py", PYTHONPATH=str(ROOT), TMPDIR=str(workspace / "temporary"))
+    assert (result.returncode, result.stderr) == (0, "")
+    first, second = result.stdout.split()
     assert first == second
     assert list((workspace / "temporary").iterdir()) == []
 
@@ -38,6 +38,6 @@ def test_the_files_of_a_killed_sweep_are_removed_by_its_workers_or_by_the_next_c
         process.wait()
         for worker in workers:  # they end once their parent is dead
             wait_for_end(worker)
-    done = commands.run_process(workspace, "run", "smd", TMPDIR=str(temporary))
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.run_process(workspace, "run", "smd", TMPDIR=str(temporary))
+    assert (result.returncode, result.stderr) == (0, "")
     assert sorted(temporary.iterdir()) == []

@@ -63,8 +63,8 @@ def both_backends(fmus, tmp_path, monkeypatch):
 
 def forget():
     """Clear the cache of measurements."""
-    for measured in (native.time_fmu, native.time_cvode, native.time_through_fmpy, stiff.run_fmu, stiff.run_cvode):
-        measured.cache_clear()
+    for function in (native.time_fmu, native.time_cvode, native.time_through_fmpy, stiff.run_fmu, stiff.run_cvode):
+        function.cache_clear()
 
 
 def of(all_measures, function):
@@ -127,9 +127,9 @@ def test_the_best_run_after_a_warm_up_counts():
     assert len(calls) == 5
 
 
-@pytest.mark.parametrize(("value", "reached"), [(1.0, True), (1.1, False), (nan, False)])
-def test_a_target_is_met_up_to_its_bound(value, reached):
-    assert Benchmark("a number", value, "1", 1.0, ()).is_met is reached
+@pytest.mark.parametrize(("value", "is_met"), [(1.0, True), (1.1, False), (nan, False)])
+def test_a_target_is_met_up_to_its_bound(value, is_met):
+    assert Benchmark("a number", value, "1", 1.0, ()).is_met is is_met
 
 
 def test_a_peer_is_reported_as_a_ratio_and_a_missing_one_by_name():
@@ -297,10 +297,10 @@ def test_fmusim_is_called_by_its_present_command_line(both_backends, tmp_path, m
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), os.pathsep)
     trajectory = model_exchange.run_fmusim(scene, 1e-8)
-    given = json.loads((tmp_path / "fmusim.json").read_text())
-    assert (given["interface_type"], given["solver"], given["tolerance"]) == ("me", "cvode", 1e-8)
-    assert dict(given["values"]) == {name: repr(value) for name, value in scene.run.values.items()}
-    assert given["inputs"] == ",".join(scene.run.inputs or ())
+    arguments = json.loads((tmp_path / "fmusim.json").read_text())
+    assert (arguments["interface_type"], arguments["solver"], arguments["tolerance"]) == ("me", "cvode", 1e-8)
+    assert dict(arguments["values"]) == {name: repr(value) for name, value in scene.run.values.items()}
+    assert arguments["inputs"] == ",".join(scene.run.inputs or ())
     assert trajectory.columns[names[0]].tolist() == [1.5, 1.5]
 
 

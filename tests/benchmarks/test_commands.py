@@ -76,17 +76,17 @@ def test_tables_fit_into_80_columns(name):
 
 @pytest.mark.parametrize("command", ["", *main.commands])
 def test_help_text_is_complete(tmp_path, command):
-    done = commands.benchmarks(tmp_path, *command.split(), "--help", COLUMNS=str(WIDTH))
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "Example" in done.stdout
-    _, text = done.stdout.split("\n\n", 1)  # the first paragraph is the usage, with repeatable arguments
+    result = commands.benchmarks(tmp_path, *command.split(), "--help", COLUMNS=str(WIDTH))
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "Example" in result.stdout
+    _, text = result.stdout.split("\n\n", 1)  # the first paragraph is the usage, with repeatable arguments
     assert "..." not in text
 
 
 def test_an_unknown_rival_ends_in_one_sentence(workspace):
-    done = commands.benchmarks(workspace, "rivals", "mujocco")
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
-    assert "unknown rival 'mujocco' (nearest: 'mujoco'); allowed: " in done.stderr
+    result = commands.benchmarks(workspace, "rivals", "mujocco")
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
+    assert "unknown rival 'mujocco' (nearest: 'mujoco'); allowed: " in result.stderr
 
 
 @pytest.mark.parametrize("command", ["bench", "importers"])

@@ -22,13 +22,16 @@ pytestmark = pytest.mark.slow
 
 # Both backends of a model agree bit for bit (native/test_python_native_agreement.py), and the code specific to a
 # backend is the same for all models: each model is checked with one backend, the sled with both.
-CHECKED = {"python": ["stickslip"], "native": sorted(MODELS)}
+CHECKED_MODELS = {"python": ["stickslip"], "native": sorted(MODELS)}
 
 
-@pytest.fixture(scope="module", params=CHECKED)
-def checked(request, fmus, tmp_path_factory):
+@pytest.fixture(scope="module", params=CHECKED_MODELS)
+def check_results(request, fmus, tmp_path_factory):
     """Return the models to check with a backend, and all rows of their table, computed once per test run."""
-    names, source = CHECKED[request.param], fmus if request.param == "python" else native_fmus.build_native_fmus()
+    names, source = (
+        CHECKED_MODELS[request.param],
+        fmus if request.param == "python" else native_fmus.build_native_fmus(),
+    )
 
     def make(out):
         folder = tmp_path_factory.mktemp("checked")
@@ -41,8 +44,8 @@ def checked(request, fmus, tmp_path_factory):
 
 @pytest.mark.parametrize("check", CHECKS)
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
-def test_the_importer_passes(checked, importer, check):
-    names, rows = checked
+def test_the_importer_passes(check_results, importer, check):
+    names, rows = check_results
     importer_rows = [row for row in rows if row.importer.startswith(importer.name)]
     if importer_rows[0].reason:
         pytest.skip(importer_rows[0].reason)
@@ -52,8 +55,8 @@ def test_the_importer_passes(checked, importer, check):
     assert len(row.cells) + len(unfit) == len(names)
 
 
-def test_the_table_lists_every_model_and_names_missing_tools(checked):
-    names, rows = checked
+def test_the_table_lists_every_model_and_names_missing_tools(check_results):
+    names, rows = check_results
     unfit = [row.importer.removesuffix(".fmu") for row in rows if row.importer.endswith(".fmu")]
     assert sorted([*table.fmu_names(rows), *unfit]) == names
     assert {row.importer for row in rows if row.reason} >= set(NOT_RUN)
@@ -103,18 +106,18 @@ def test_a_crash_or_timeout_affects_only_its_own_check(make_module, monkeypatch)
     versions, processes = {}, []
     for name, request in zip(names, requests, strict=True):
         try:
-            played = checks.run_request(tool, request)
-            versions[name] = played.reply.version, played.stderr
-            processes.append(played.reply.accepted)
+            answer = checks.run_request(tool, request)
+            versions[name] = answer.reply.version, answer.stderr
+            processes.append(answer.reply.accepted)
         except CheckFailedError as wrong:
             versions[name] = str(wrong)
-    ended = {
+    endings = {
         "crash": "it ended with exit status -11: crash speaks",
         "leak": "it ended with exit status -9: leak speaks",
     }
     assert versions == {
         **{name: (name, f"{name} speaks\n") for name in ("one", "two", "three")},
-        **ended,
+        **endings,
         "hang": "no answer after 2 s",
     }
     assert len(set(processes)) == 3

@@ -61,10 +61,10 @@ def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
 
 
 def test_smoothing_loses_four_digits_at_more_cost_than_event_location(rows):
-    smooth = next(row for row in rows("block on a belt", "scipy, arctan(1e6 v)") if row.method == "LSODA")
-    located = next(row for row in rows("block on a belt", study.RUNTIME) if row.method == "ode45")
-    assert smooth.error > 1e4 * located.error
-    assert smooth.evaluations > located.evaluations
+    smooth_row = next(row for row in rows("block on a belt", "scipy, arctan(1e6 v)") if row.method == "LSODA")
+    located_row = next(row for row in rows("block on a belt", study.RUNTIME) if row.method == "ode45")
+    assert smooth_row.error > 1e4 * located_row.error
+    assert smooth_row.evaluations > located_row.evaluations
 
 
 @pytest.mark.parametrize("method", method_numbers(model_class("coulomb")))

@@ -21,7 +21,7 @@ from benchmarks.rivals.scenes import SCENES, Solution, slip_changes
 from benchmarks.rivals.study import run_in_child
 from harness.references.certified_reference import FOLDER, load_reference
 
-CERTIFIED = {"sled": "stickslip", "belt": "more/belt", "pendulum": "pendulum"}  # whole runs have certified files
+CERTIFIED_FILES = {"sled": "stickslip", "belt": "more/belt", "pendulum": "pendulum"}  # whole runs have certified files
 
 
 @pytest.fixture(scope="module")
@@ -48,14 +48,18 @@ def at_rest(scene):
     return Solution(scene.times, np.tile(scene.start, (len(scene.times), 1)), steps=7)
 
 
-@pytest.mark.parametrize("name", CERTIFIED)
+@pytest.mark.parametrize("name", CERTIFIED_FILES)
 def test_references_agree_with_the_certified_results(references, name):
-    certified, scene = load_reference(CERTIFIED[name], FOLDER), SCENES[name]
-    common, at_scene, at_certified = np.intersect1d(scene.times.round(9), certified.times.round(9), return_indices=True)
+    certified_result, scene = load_reference(CERTIFIED_FILES[name], FOLDER), SCENES[name]
+    common, at_scene, at_certified = np.intersect1d(
+        scene.times.round(9), certified_result.times.round(9), return_indices=True
+    )
     assert len(common) > 50
-    assert references[name].states[::FINE][at_scene, :2] == pytest.approx(certified.states[at_certified, :2], abs=1e-9)
-    assert [mode for _, mode in references[name].events] == [mode for _, mode in certified.events]
-    times = [t for t, _ in certified.events]
+    assert references[name].states[::FINE][at_scene, :2] == pytest.approx(
+        certified_result.states[at_certified, :2], abs=1e-9
+    )
+    assert [mode for _, mode in references[name].events] == [mode for _, mode in certified_result.events]
+    times = [t for t, _ in certified_result.events]
     assert [t for t, _ in references[name].events] == pytest.approx(times, abs=1e-9)
 
 
@@ -102,8 +106,8 @@ def test_each_rival_is_one_short_file():
 def test_lines_of_code_are_counted_without_blank_lines_comments_and_docstrings():
     source = '"""Title.\n\nMore."""\n\nimport os  # in\n\n# out\ndef f():\n    """Out."""\n    return os\n'
     assert count_lines(source) == 3
-    own = count_lines((ENGINES / "own_fmu.py").read_text(encoding="utf-8"))
-    assert OWN.lines > own + 100  # with its models
+    n_own_lines = count_lines((ENGINES / "own_fmu.py").read_text(encoding="utf-8"))
+    assert OWN.lines > n_own_lines + 100  # with its models
     assert RIVALS["scipy"].lines == count_lines((ENGINES / "scipy.py").read_text(encoding="utf-8"))
 
 
@@ -133,7 +137,7 @@ def test_what_an_engine_raises_is_a_gap(engine):
     assert run_case(RivalCase("mujoco", "sled", {})).gap == "frictionloss is one constant force"
 
 
-BROKEN = """
+BROKEN_ENGINE = """
 import os, sys, time
 from benchmarks.rivals import child
 from benchmarks.rivals.scenes import Solution
@@ -157,7 +161,7 @@ def run_case(case):
     ],
 )
 def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(make_module, monkeypatch, how, reason):
-    monkeypatch.setattr(study, "run_case", make_module("broken_rival", BROKEN).run_case)
+    monkeypatch.setattr(study, "run_case", make_module("broken_rival", BROKEN_ENGINE).run_case)
     replies = run_in_child([RivalCase("broken", name, {"how": how}) for name in ("rest", "sled", "held")], 8.0)
     assert [reply.gap for reply in replies] == ["", reason, ""]
 
@@ -169,8 +173,8 @@ def test_events_are_matched_by_kind_and_time():
     assert match_events(late, expected, 5.0) == (0, 0, pytest.approx(0.1))
     assert match_events([(1.0, 1), (2.0, 0)], expected, 5.0)[:2] == (2, 0)
     assert match_events([*expected, (4.5, 1)], expected, 5.0)[:2] == (0, 1)
-    missed, spurious, error = match_events([], expected, 5.0)
-    assert (missed, spurious, isnan(error)) == (4, 0, True)
+    n_missed, n_spurious, error = match_events([], expected, 5.0)
+    assert (n_missed, n_spurious, isnan(error)) == (4, 0, True)
 
 
 def test_a_slip_begins_and_ends_where_it_passes_the_level_even_within_one_step():
@@ -190,9 +194,9 @@ def test_a_body_that_stays_where_it_should_move_has_its_error_and_no_events(refe
 
 def test_the_command_writes_a_table_a_figure_and_the_gaps(user_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(study, "run_in_child", lambda requests, timeout: [*map(reply_of_reference, requests)])
-    done = commands.benchmarks(user_folder, "rivals", "scipy", "--out", tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    words = " ".join(done.stdout.split())  # long lines are wrapped
+    result = commands.benchmarks(user_folder, "rivals", "scipy", "--out", tmp_path)
+    assert (result.returncode, result.stderr) == (0, "")
+    words = " ".join(result.stdout.split())  # long lines are wrapped
     assert "Exact to 1e-09 in every scene, without missed or spurious events: scipy (default); scipy (best);" in words
     folder = tmp_path / study.FOLDER
     assert {file.name for file in folder.iterdir()} == {study.FILE, study.FIGURE, "provenance.json", "summary.json"}

@@ -17,16 +17,16 @@ from benchmarks.suite import importers
 from benchmarks.suite.cases import CASES
 from benchmarks.suite.check import check_case, read_columns
 
-WRITTEN = ("rest", "jump_of_load", "late_start", "tie", "short_sticks", "stick_slip")
+CASE_NAMES = ("rest", "jump_of_load", "late_start", "tie", "short_sticks", "stick_slip")
 
 
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory):
     require_compiler()
     folder = tmp_path_factory.mktemp("suite")
-    words = [word for name in WRITTEN for word in ("--case", name)]
-    done = commands.benchmarks(folder, "suite", folder, "--platform", "linux64", "--archive", *words)
-    assert (done.returncode, done.stderr) == (0, "")
+    words = [word for name in CASE_NAMES for word in ("--case", name)]
+    result = commands.benchmarks(folder, "suite", folder, "--platform", "linux64", "--archive", *words)
+    assert (result.returncode, result.stderr) == (0, "")
     return folder
 
 
@@ -45,10 +45,10 @@ def test_an_fmu_contains_the_files_of_its_case_and_is_valid(suite, version):
     assert fmpy.validation.validate_fmu(fmu) == []
     with ZipFile(fmu) as archive:
         names = [name for name in archive.namelist() if name.startswith("extra/org.fmi-standard.fmi-ls-ref/")]
-        contained = {name.rpartition("/")[2]: archive.read(name) for name in names}
-    related = ElementTree.fromstring(contained.pop("fmi-ls-manifest.xml")).findall("Related")
-    assert [item.get("source") for item in related] == list(contained)
-    assert [item.get("role") for item in related] == [
+        files = {name.rpartition("/")[2]: archive.read(name) for name in names}
+    elements = ElementTree.fromstring(files.pop("fmi-ls-manifest.xml")).findall("Related")
+    assert [item.get("source") for item in elements] == list(files)
+    assert [item.get("role") for item in elements] == [
         "result",  # of the default run
         "experiment/validation",
         "parameter",
@@ -56,7 +56,7 @@ def test_an_fmu_contains_the_files_of_its_case_and_is_valid(suite, version):
         "result",
         "result",
     ]
-    for name, content in list(contained.items())[1:]:
+    for name, content in list(files.items())[1:]:
         assert content == (suite / "jump_of_load" / name).read_bytes()
 
 
@@ -65,12 +65,12 @@ def verdict(suite, runner, name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", WRITTEN)
+@pytest.mark.parametrize("name", CASE_NAMES)
 def test_fmpy_passes_each_case_and_check_py_says_so(suite, name, tmp_path):
     assert verdict(suite, importers.run_fmpy, name, tmp_path) == "passed"
     command = [sys.executable, "-I", suite / "check.py", tmp_path, name]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "0 of 1 cases failed")
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout.splitlines()[-1]) == (0, "0 of 1 cases failed")
 
 
 @pytest.mark.slow

@@ -49,13 +49,13 @@ def test_a_signal_ends_a_build_and_leaves_nothing_behind(temporary, tmp_path, op
 def test_standard_output_that_is_full_is_one_sentence():
     with open("/dev/full", "w") as full:
         command = [sys.executable, ROOT / "build_fmus.py", "--help"]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (1, "Error: No space left on device\n")
+        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert (result.returncode, result.stderr) == (1, "Error: No space left on device\n")
 
 
 @pytest.mark.campaign
 def test_optimized_bytecode_without_docstrings_builds_the_same_fmu(fmus, tmp_path):
     command = [sys.executable, "-OO", ROOT / "build_fmus.py", "smd", "--out", tmp_path]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert (done.returncode, done.stderr) == (0, "")
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (result.returncode, result.stderr) == (0, "")
     assert (tmp_path / "smd.fmu").read_bytes() == (fmus / "smd.fmu").read_bytes()

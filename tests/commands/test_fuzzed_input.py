@@ -111,8 +111,8 @@ SPANS = (
 
 def run_command(*arguments, figures=True):
     """Return exit status and error message of a command; any unexpected exception fails the test."""
-    done = harness(Path.cwd(), *arguments, figures=figures)
-    return done.returncode, done.stderr
+    result = harness(Path.cwd(), *arguments, figures=figures)
+    return result.returncode, result.stderr
 
 
 def scene_text(scene):
@@ -295,14 +295,14 @@ FULL = "Error: No space left on device\n"
 )
 def test_an_unwritable_standard_output_is_no_crash(workspace, command, shell, status, message):
     (workspace / "mine.toml").write_text(scene_text(SCENE))
-    done = python(workspace, *command, shell=shell)
-    assert (done.returncode, done.stderr) == (status, message)
+    result = python(workspace, *command, shell=shell)
+    assert (result.returncode, result.stderr) == (status, message)
 
 
 @pytest.mark.campaign
 def test_a_closed_standard_input_is_empty(user_folder, tmp_path):
-    done = python(user_folder, "decay", "-", "--out", tmp_path, shell="<&-")
-    assert (done.returncode, done.stderr) == (2, "Error: standard input is empty\n")
+    result = python(user_folder, "decay", "-", "--out", tmp_path, shell="<&-")
+    assert (result.returncode, result.stderr) == (2, "Error: standard input is empty\n")
 
 
 def test_a_record_is_read_from_a_named_pipe(tmp_path):
@@ -330,6 +330,6 @@ def test_an_ascii_standard_output_is_no_crash(workspace, command, coding):
     rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
     (workspace / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
     (workspace / "mine.toml").write_text(scene_text(SCENE))
-    done = python(workspace, *command, **coding)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.isascii()
+    result = python(workspace, *command, **coding)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.isascii()

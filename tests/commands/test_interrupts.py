@@ -80,13 +80,13 @@ def test_a_context_is_exited_if_a_signal_arrives_during_entry():
         finally:
             events.append("folder")
 
-    def entered():
-        held = folder()
-        held.__enter__()
+    def enter_folder():
+        context = folder()
+        context.__enter__()
         raise KeyboardInterrupt
 
     with pytest.raises(CommandInterruptedError) as error, interruptible():
-        entered()
+        enter_folder()
     assert error
     assert events == ["folder"]
 
@@ -95,7 +95,7 @@ def test_an_interrupt_swallowed_by_a_callee_still_ends_the_command(monkeypatch):
     monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
 
-    def swallowed():
+    def swallow_interrupt():
         with interruptible():
             with suppress(KeyboardInterrupt):  # as a Python FMU may do
                 signal.raise_signal(signal.SIGINT)
@@ -105,7 +105,7 @@ def test_an_interrupt_swallowed_by_a_callee_still_ends_the_command(monkeypatch):
     before = [signal.signal(number, handler) for number, handler in zip(interrupt.SIGNALS, default, strict=True)]
     try:
         with pytest.raises(CommandInterruptedError, match="interrupted") as error:
-            swallowed()
+            swallow_interrupt()
         assert error.value.status == 130
         with pytest.raises(KeyboardInterrupt):
             check_interrupt()
@@ -142,17 +142,17 @@ def handled_sigint(monkeypatch):
 
 
 def test_a_signal_during_a_wait_is_raised_after_it(handled_sigint, monkeypatch):
-    finished = []
+    wait_results = []
 
     def interrupted_wait(*arguments, **options):
         signal.raise_signal(signal.SIGINT)
-        finished.append(concurrent.futures.wait(*arguments, **options))
-        return finished[0]
+        wait_results.append(concurrent.futures.wait(*arguments, **options))
+        return wait_results[0]
 
     monkeypatch.setattr(interruptible_wait, "wait", interrupted_wait)
     with pytest.raises(KeyboardInterrupt):
         wait_for_any([Future()])
-    assert finished
+    assert wait_results
 
 
 def test_signals_at_many_moments_of_a_wait_leave_no_lock_held(handled_sigint, monkeypatch):
@@ -176,8 +176,8 @@ def test_signals_at_many_moments_of_a_wait_leave_no_lock_held(handled_sigint, mo
 
 
 def test_messages_larger_than_a_pipe_buffer_arrive_at_a_slow_reader():
-    done = run_subprocess(["sh", "-c", "sleep 0.3; wc -c"], "a" * 200_000, timeout=60.0)
-    assert (done.returncode, done.stdout.strip()) == (0, "200000")
+    result = run_subprocess(["sh", "-c", "sleep 0.3; wc -c"], "a" * 200_000, timeout=60.0)
+    assert (result.returncode, result.stdout.strip()) == (0, "200000")
 
 
 def test_a_program_that_times_out_ends_with_all_its_children(tmp_path, monkeypatch):
@@ -213,19 +213,19 @@ def test_a_worker_exits_and_removes_its_files_after_its_parent_was_killed(tmp_pa
 
 def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypatch):
     monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
-    ended = []
+    endings = []
 
     def wait():
         try:
             run_subprocess(["sleep", "100"])
         except KeyboardInterrupt:
-            ended.append("here")
+            endings.append("here")
 
     thread = threading.Thread(target=wait)
     thread.start()
     interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
     thread.join(timeout=30)
-    assert ended == ["here"]
+    assert endings == ["here"]
 
 
 def test_the_interrupt_message_survives_cleanup(monkeypatch):
@@ -240,11 +240,11 @@ def test_the_interrupt_message_survives_cleanup(monkeypatch):
                 pass
 
     try:
-        with pytest.raises(CommandInterruptedError, match="half of it is kept") as ended:
+        with pytest.raises(CommandInterruptedError, match="half of it is kept") as error:
             fail()
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert ended.value.status == 143
+    assert error.value.status == 143
 
 
 def test_a_swallowed_interrupt_is_raised_at_the_next_report_of_progress(workspace, monkeypatch):
@@ -257,7 +257,7 @@ def test_a_swallowed_interrupt_is_raised_at_the_next_report_of_progress(workspac
 def interrupt_import(folder, library, arguments, number=signal.SIGINT):
     """Return exit status, output and messages of a command in which an imported library interrupts the process."""
     (folder / f"{library}.py").write_text(f"import os, time\nos.kill(os.getpid(), {number:d})\ntime.sleep(60)\n")
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, *arguments],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": f"{folder}{os.pathsep}{ROOT}"},
@@ -266,7 +266,7 @@ def interrupt_import(folder, library, arguments, number=signal.SIGINT):
         timeout=100,
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
-    return done.returncode, done.stdout, done.stderr
+    return result.returncode, result.stdout, result.stderr
 
 
 @pytest.mark.parametrize(

@@ -53,13 +53,13 @@ def main_job():
 
 
 def test_the_main_job_runs_every_published_case(main_job):
-    done, results = main_job
-    assert (done.returncode, done.stderr) == (0, "")
+    result, results = main_job
+    assert (result.returncode, result.stderr) == (0, "")
     cases = {path.stem for path in (ROOT / "harness/scenes").glob("*.toml")}
     assert {path.name for path in results.iterdir()} == cases
-    assert re.search(" published *\n.* MATLAB ode23 *\n", done.stdout)  # above the values of a run
+    assert re.search(" published *\n.* MATLAB ode23 *\n", result.stdout)  # above the values of a run
     for case in cases:
-        assert case in done.stdout
+        assert case in result.stdout
         assert {"trajectory.csv", "steps.csv", "figure.svg"} <= {path.name for path in (results / case).iterdir()}
 
 
@@ -78,14 +78,14 @@ def test_the_main_job_names_each_case_that_differs(workspace, monkeypatch):
     shutil.copy(ROOT / "harness/scenes/coulomb-stop.toml", workspace / "scenes")
     monkeypatch.setattr("harness.scenes.scene.SHIPPED", workspace / "scenes")
     monkeypatch.setattr("harness.studies.run.result.MAX_DEVIATION", -1.0)
-    done = harness(workspace, "--out", "results", FORCE_COLOR="1")
-    assert done.returncode == 0
-    assert "\x1b[31m0 of 1 cases agree within" in done.stdout
-    assert "coulomb-stop: " in done.stdout.splitlines()[-1]
+    result = harness(workspace, "--out", "results", FORCE_COLOR="1")
+    assert result.returncode == 0
+    assert "\x1b[31m0 of 1 cases agree within" in result.stdout
+    assert "coulomb-stop: " in result.stdout.splitlines()[-1]
 
 
 @pytest.mark.parametrize(
-    ("case", "quantity", "measured"),
+    ("case", "quantity", "value"),
     [
         ("smd", "steps", "235"),
         ("smd", "mean step", "17.059"),
@@ -101,10 +101,10 @@ def test_the_main_job_names_each_case_that_differs(workspace, monkeypatch):
         ("pendulum", "joint torque, 5 cycles", "0.011522"),
     ],
 )
-def test_the_table_shows_the_published_values(main_job, case, quantity, measured):
+def test_the_table_shows_the_published_values(main_job, case, quantity, value):
     block = main_job[0].stdout.split(f"\n{case} ")[1].split("\n   ")[0]
     line = next(line for line in block.splitlines() if line.strip().startswith(quantity))
-    assert line.replace(quantity, "", 1).replace("(time points)", "").split()[0] == measured
+    assert line.replace(quantity, "", 1).replace("(time points)", "").split()[0] == value
 
 
 @pytest.mark.parametrize(("case", "kind"), [("smd", "published"), ("stickslip", "reference"), ("coulomb", "parameter")])
@@ -141,16 +141,16 @@ def test_events_are_listed_for_dry_friction(main_job):
 
 
 def test_steps_add_up_to_the_run(main_job):
-    head, (times, sizes, rejected) = table(main_job[1] / "coulomb-sign/steps.csv")
+    head, (times, sizes, rejections) = table(main_job[1] / "coulomb-sign/steps.csv")
     assert head == ["t [s]", "h [s]", "rejected"]
     assert times[-1] == 4.0
     assert sizes.sum() == pytest.approx(4.0, rel=1e-14)
-    assert rejected.sum() > 100  # it chatters at every reversal
+    assert rejections.sum() > 100  # it chatters at every reversal
 
 
 def test_a_scene_writes_only_the_files_it_requests(scene):
-    done, results = scene(BASE + "grid = 0.25\nstop = 2")
-    assert (done.returncode, done.stderr) == (0, "")
+    result, results = scene(BASE + "grid = 0.25\nstop = 2")
+    assert (result.returncode, result.stderr) == (0, "")
     assert {path.name for path in results.iterdir()} == {
         "trajectory.csv",
         "figure.svg",
@@ -199,17 +199,17 @@ END = 'plots = []\n[decay]\ngives = "zeta"\n'
 def test_a_measure_unsupported_by_its_samples_is_refused_and_the_remedy_works(scene, text, coarse, name, value):
     text = 'title = "a title"\n' + text
     text += "" if text.endswith(SLIP[-20:]) or "law" in text else END
-    done, _ = scene(text.replace("\nanalyses", f"\n{coarse}analyses"))
-    assert done.returncode == 1
-    (step,) = re.findall(r"each .* needs at least 8 samples, .* has \d: set grid to (\S+) s or less\n", done.stderr)
-    done, _ = scene(text.replace("\nanalyses", f"\ngrid = {step}\nanalyses"), "--json")
-    quantities = {item["name"]: item["value"] for item in json.loads(done.stdout)["quantities"]}
+    result, _ = scene(text.replace("\nanalyses", f"\n{coarse}analyses"))
+    assert result.returncode == 1
+    (step,) = re.findall(r"each .* needs at least 8 samples, .* has \d: set grid to (\S+) s or less\n", result.stderr)
+    result, _ = scene(text.replace("\nanalyses", f"\ngrid = {step}\nanalyses"), "--json")
+    quantities = {item["name"]: item["value"] for item in json.loads(result.stdout)["quantities"]}
     assert quantities[name] == pytest.approx(value, rel=1e-3)
 
 
 def test_slips_are_measured_without_the_acceleration(scene):
-    done, _ = scene(BASE + "plots = []\nanalyses = ['slip']", "--json")
-    names = [item["name"] for item in json.loads(done.stdout)["quantities"]]
+    result, _ = scene(BASE + "plots = []\nanalyses = ['slip']", "--json")
+    names = [item["name"] for item in json.loads(result.stdout)["quantities"]]
     assert "peak_speed" in names
     assert "peak_acceleration" not in names
 
@@ -225,11 +225,11 @@ def test_a_following_grid_contains_the_grid_points_and_the_steps(scene):
 def test_the_grid_does_not_change_the_solver_steps(scene):
     text = BASE + 'stop = 6\nmethod = "ode23"\nlaw = "hybrid"\nrtol = 1e-5\n'
     _, results = scene(text)
-    free = table(results / "steps.csv")[1]
+    free_steps = table(results / "steps.csv")[1]
     _, results = scene(text + "grid = 0.013\nfollow = true")
-    gridded = table(results / "steps.csv")[1]
-    assert free.shape == gridded.shape
-    assert gridded == pytest.approx(free, rel=1e-9)
+    gridded_steps = table(results / "steps.csv")[1]
+    assert free_steps.shape == gridded_steps.shape
+    assert gridded_steps == pytest.approx(free_steps, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -267,26 +267,26 @@ def test_an_invalid_scene_is_one_sentence_and_keeps_the_previous_result(scene, t
     older = tmp_path / "out/mine/trajectory.csv"
     older.parent.mkdir(parents=True)
     older.write_text("older")
-    done, results = scene(text)
-    assert done.returncode == status
-    assert done.stderr.startswith("Error: scene mine: ")
-    assert sentence in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert done.stdout == ""
+    result, results = scene(text)
+    assert result.returncode == status
+    assert result.stderr.startswith("Error: scene mine: ")
+    assert sentence in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert result.stdout == ""
     assert older.read_text() == "older"
     assert [path.name for path in results.parent.iterdir()] == ["mine"]
 
 
 def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
-    published = "\n[reference]\nsource = 'me'\nrun_time = 1\n"
+    reference_table = "\n[reference]\nsource = 'me'\nrun_time = 1\n"
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
-        (workspace / f"{name}.toml").write_text(BASE + extra + published)
+        (workspace / f"{name}.toml").write_text(BASE + extra + reference_table)
     monkeypatch.setattr("harness.scenes.scene.SHIPPED", workspace)
-    done = harness(workspace, "--out", workspace / "out")
-    assert done.returncode == 1
-    assert done.stderr.startswith("Error: scene bad: mu_d is 0.95")
-    assert done.stderr.count("\n") == 1
-    assert "\nbad: failed\n" in done.stdout
+    result = harness(workspace, "--out", workspace / "out")
+    assert result.returncode == 1
+    assert result.stderr.startswith("Error: scene bad: mu_d is 0.95")
+    assert result.stderr.count("\n") == 1
+    assert "\nbad: failed\n" in result.stdout
     assert [path.name for path in (workspace / "out").iterdir()] == ["good"]
 
 
@@ -312,10 +312,12 @@ def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     shutil.rmtree(workspace / "results", ignore_errors=True)  # otherwise the second run reports that nothing changed
     separate = commands.run_process(workspace, *arguments, PATH="", COLUMNS="100")
     assert (inside.returncode, inside.stderr) == (separate.returncode, separate.stderr)
-    outputs = [re.sub(TIME, "", done.stdout) for done in (inside, separate)]
+    outputs = [re.sub(TIME, "", result.stdout) for result in (inside, separate)]
     assert re.sub(NUMBER, "", outputs[0]) == re.sub(NUMBER, "", outputs[1])
-    one, other = (list(map(float, re.findall(NUMBER, text))) for text in outputs)
-    assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
+    numbers, other_numbers = (list(map(float, re.findall(NUMBER, text))) for text in outputs)
+    assert numbers == pytest.approx(
+        other_numbers, rel=1e-6, abs=1e-9
+    )  # sums of numpy depend on the memory alignment of an array
 
 
 @pytest.mark.campaign
@@ -331,9 +333,9 @@ def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
             f"run_and_save({file!r}, Path({str(tmp_path)!r}), lambda name, share: None)\n"
             f"print([name for name in {optional} if name in sys.modules])\n"
         )
-    done = commands.run_python(user_folder, "-c", code)
-    assert done.stderr == ""
-    assert done.stdout == f"[]\n{optional[:1]}\n{[optional[0], optional[3]]}\n"
+    result = commands.run_python(user_folder, "-c", code)
+    assert result.stderr == ""
+    assert result.stdout == f"[]\n{optional[:1]}\n{[optional[0], optional[3]]}\n"
 
 
 def test_no_temporary_fmu_files_remain_of_a_failed_run(user_folder, tmp_path):
@@ -349,15 +351,15 @@ def test_no_temporary_fmu_files_remain_of_a_failed_run(user_folder, tmp_path):
 @pytest.mark.campaign
 def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     """A slip every two seconds, up to 1e12 s; up to 1e300 s, a slip is too short beside the run."""
-    done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e300, "--timeout", 0.5)
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e12, "--timeout", 0.5)
-    assert done.returncode == 1
-    (line,) = done.stderr.splitlines()
+    result = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e300, "--timeout", 0.5)
+    assert (result.returncode, result.stderr.count("\n")) == (1, 1)
+    result = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e12, "--timeout", 0.5)
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
     assert line.startswith("Error: stickslip.fmu is at t = ")
     assert line.endswith("advances by less than 1/4096 of the run in 0.5 s: shorten the run, or allow a longer timeout")
-    done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5)
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5)
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("words", [["--set", "m=1.5,c=0,solver.method=exact"], ["--set", "m=1.5", "--set", "c=0"]])
@@ -365,8 +367,8 @@ def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     "command", campaign_after(1, [(("run",),), (("sweep", "--vary", "x0=0.1,0.2", "--workers", "1"),)])
 )
 def test_several_assignments_stand_in_one_option(workspace, command, words):
-    done = commands.harness(workspace, *command, "fmus/smd.fmu", *words, "--stop", "0.5", "--out", "out")
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.harness(workspace, *command, "fmus/smd.fmu", *words, "--stop", "0.5", "--out", "out")
+    assert (result.returncode, result.stderr) == (0, "")
     (file,) = (workspace / "out").rglob("provenance.json")
     parameters = json.loads(file.read_text())["parameters"]
     assert (parameters["m"]["value"], parameters["c"]["value"]) == (1.5, 0.0)
@@ -375,8 +377,8 @@ def test_several_assignments_stand_in_one_option(workspace, command, words):
 @pytest.mark.parametrize("words", [["--rtol", "1e-4"], ["--set", "solver.rtol=1e-4"]])
 def test_rtol_sets_the_solver_of_an_fmu_of_this_project(fmus, tmp_path, words):
     (tmp_path / "fmus").symlink_to(fmus)
-    done = commands.harness(tmp_path, "run", "fmus/coulomb.fmu", "--set", "solver.method=ode45", *words)
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.harness(tmp_path, "run", "fmus/coulomb.fmu", "--set", "solver.method=ode45", *words)
+    assert (result.returncode, result.stderr) == (0, "")
     assert load_result(tmp_path / "results/coulomb").parameters["solver.rtol"] == 1e-4
 
 
@@ -395,9 +397,9 @@ def test_a_scene_runs_with_other_values_and_is_not_compared_with_known_ones(
 ):
     """The value of a parameter that is not changed stays known."""
     options = [word for text in assignments for word in ("--set", text)]
-    done = harness(user_folder, "run", name, *options, "--json", "--out", tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    content = json.loads(done.stdout)
+    result = harness(user_folder, "run", name, *options, "--json", "--out", tmp_path)
+    assert (result.returncode, result.stderr) == (0, "")
+    content = json.loads(result.stdout)
     assert content["quantities"]
     assert [row["name"] for row in (content["comparison"] or {"values": []})["values"]] == comparison
     effective = load_result(tmp_path / name).parameters
@@ -405,17 +407,17 @@ def test_a_scene_runs_with_other_values_and_is_not_compared_with_known_ones(
 
 
 def test_a_scene_runs_to_another_stop_and_is_not_compared_then(workspace):
-    done = harness(workspace, "run", "stickslip", "--stop", 9)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "reference" not in done.stdout
-    assert re.search(r"slips +2 ", done.stdout)
+    result = harness(workspace, "run", "stickslip", "--stop", 9)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "reference" not in result.stdout
+    assert re.search(r"slips +2 ", result.stdout)
     assert load_result(workspace / "results" / "stickslip").time[-1] == 9.0
 
 
 def test_a_scene_that_runs_too_short_for_an_analysis_names_it(workspace):
-    done = harness(workspace, "run", "stickslip", "--stop", 5)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "the analysis 'slip' needs two slips, and the run has 1: set a later stop" in done.stdout
+    result = harness(workspace, "run", "stickslip", "--stop", 5)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "the analysis 'slip' needs two slips, and the run has 1: set a later stop" in result.stdout
     assert load_result(workspace / "results" / "stickslip").time[-1] == 5.0
 
 

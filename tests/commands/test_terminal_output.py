@@ -52,9 +52,9 @@ def assert_fits(output, *headings):
     ),
 )
 def test_command_tables_fit_into_80_columns(workspace, arguments, headings):
-    done = harness(workspace, *arguments, **PLAIN)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert_fits(done.stdout, *headings)
+    result = harness(workspace, *arguments, **PLAIN)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert_fits(result.stdout, *headings)
 
 
 def test_tables_of_long_commands_fit_into_80_columns():
@@ -84,12 +84,12 @@ def test_a_table_of_any_width_shows_each_cell(width):
 
 @pytest.mark.parametrize("command", ["", *commands.commands])
 def test_help_text_is_not_truncated(tmp_path, command):
-    done = harness(tmp_path, *command.split(), "--help", **PLAIN)
-    assert (done.returncode, done.stderr) == (0, "")
-    prose = [line for line in done.stdout.splitlines() if not re.search("friction-fmus|-m harness", line)]  # commands
+    result = harness(tmp_path, *command.split(), "--help", **PLAIN)
+    assert (result.returncode, result.stderr) == (0, "")
+    prose = [line for line in result.stdout.splitlines() if not re.search("friction-fmus|-m harness", line)]  # commands
     assert_fits("\n".join(prose), "Example")
     assert not [line for line in prose if re.search(r"\w\.\.\.$", line)]
-    assert "None" not in done.stdout
+    assert "None" not in result.stdout
 
 
 def test_names_with_brackets_are_printed_literally(tmp_path):
@@ -123,9 +123,9 @@ def test_a_command_without_its_fmus_explains_how_to_build_them(tmp_path, monkeyp
 )
 def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_path, arguments):
     """A native FMU also prints it to the standard error of the process, bypassing Python."""
-    done = harness(tmp_path, *arguments, backend_fmus / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
-    assert done.returncode == 1
-    assert re.fullmatch(r"Error: .*the solution diverges after t = 0.0 s.*\n", done.stderr)
+    result = harness(tmp_path, *arguments, backend_fmus / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
+    assert result.returncode == 1
+    assert re.fullmatch(r"Error: .*the solution diverges after t = 0.0 s.*\n", result.stderr)
 
 
 @pytest.mark.parametrize(
@@ -137,10 +137,10 @@ def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_pat
 def test_a_missing_optional_package_is_named_before_any_run(workspace, package, extra, arguments):
     """In a process of its own, which has not imported them; those of `decay` are named by a test of record formats."""
     (workspace / "sitecustomize.py").write_text(f"import sys; sys.modules[{package!r}] = None")
-    done = processes.run_process(workspace, *arguments, PYTHONPATH=f"{workspace}{os.pathsep}{ROOT}")
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1), done.stderr
-    assert package in done.stderr
-    assert f"pip install 'friction-fmus[{extra}]'" in done.stderr
+    result = processes.run_process(workspace, *arguments, PYTHONPATH=f"{workspace}{os.pathsep}{ROOT}")
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (1, "", 1), result.stderr
+    assert package in result.stderr
+    assert f"pip install 'friction-fmus[{extra}]'" in result.stderr
     assert not (workspace / "results").exists()
 
 

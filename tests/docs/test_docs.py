@@ -56,8 +56,8 @@ def run_page(page, folder, environment):
     """Run the blocks of a page in a folder."""
     (folder / "docs").symlink_to(DOCS)
     command = [Path(environment["PROGRAMS"], "run_blocks"), folder, page]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=600)
-    assert done.returncode == 0, done.stderr
+    result = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=600)
+    assert result.returncode == 0, result.stderr
 
 
 def figure_words(figure, leave_out):
@@ -67,8 +67,8 @@ def figure_words(figure, leave_out):
     """
     svg = figure.read_text(encoding="utf-8")
     texts = re.findall(r"<text[^>]*>([^<]+)</text>", svg) or re.findall(r"<!--\s*([^$]+?)\s*-->", svg)
-    kept = [html.unescape(text) for text in texts if not re.fullmatch(leave_out, text)]
-    return {word for text in kept for word in text.split()}
+    remaining_texts = [html.unescape(text) for text in texts if not re.fullmatch(leave_out, text)]
+    return {word for text in remaining_texts for word in text.split()}
 
 
 def is_number(word):
@@ -78,11 +78,11 @@ def is_number(word):
 
 def assert_same_texts(picture, figure, leave_out=""):
     """The picture of the pages has the texts of the figure of a run; only its tick labels differ."""
-    shown, drawn = (figure_words(path, leave_out) for path in (picture, figure))
-    assert drawn, f"{figure.name} has no text"
+    picture_words, run_words = (figure_words(path, leave_out) for path in (picture, figure))
+    assert run_words, f"{figure.name} has no text"
     message = f"{picture.name} shows another run: python docs/make_images.py {picture.stem}"
-    assert drawn - shown == set(), message
-    assert {word for word in shown - drawn if not is_number(word)} == set(), message
+    assert run_words - picture_words == set(), message
+    assert {word for word in picture_words - run_words if not is_number(word)} == set(), message
 
 
 def read_description(name):
@@ -108,8 +108,8 @@ def test_code_blocks_run_and_draw_the_pictures_of_the_page(page, workspace, envi
 @pytest.mark.parametrize("name", ["coulomb", "pendulum", "derivatives"])
 def test_the_picture_of_a_scene_is_that_of_its_run(name, workspace):
     command, file = load("make_images").FIGURES_OF_COMMANDS[name]
-    done = harness_command(workspace, *command.split()[1:])
-    assert done.returncode == 0, done.stderr
+    result = harness_command(workspace, *command.split()[1:])
+    assert result.returncode == 0, result.stderr
     assert_same_texts(DOCS / "images" / f"{name}.svg", workspace / file)
 
 
@@ -168,21 +168,26 @@ def test_the_picture_of_rivals_has_the_texts_of_its_script_and_the_errors_of_the
     heading, _, *rows = table.splitlines()
     assert len(rows) == len(RIVALS)
     panels = re.split(r'<g id="axes_\d+">', picture.read_text(encoding="utf-8"))[1:]
-    shown = dict(zip(SCENES, panels, strict=True))
+    scene_panels = dict(zip(SCENES, panels, strict=True))
     for column, name in enumerate(re.findall(r"`(\w+)`", heading)):
         cells = [row.strip("| ").split(" | ")[column + 1] for row in rows]
         errors = [float(word) for cell in cells for word in cell.split(" / ") if word != "-"]
-        assert read_errors_of_figure(shown[name]) == pytest.approx(np.sort(errors), rel=0.05), name
+        assert read_errors_of_figure(scene_panels[name]) == pytest.approx(np.sort(errors), rel=0.05), name
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", ["info", "run nosuch", "run smd --nosuch"])
 def test_a_forked_command_prints_and_ends_as_a_fresh_one(environment, workspace, words):
     program = [Path(environment["PROGRAMS"], "friction-fmus"), *words.split()]
-    forked = subprocess.run(program, cwd=workspace, env=environment, capture_output=True, text=True)
-    fresh = run_process(workspace, *words.split())
-    expected = [text.replace("python -m harness", "friction-fmus") for text in (fresh.stdout, fresh.stderr)]
-    assert (forked.returncode, [forked.stdout, forked.stderr]) == (fresh.returncode, expected)
+    forked_process = subprocess.run(program, cwd=workspace, env=environment, capture_output=True, text=True)
+    fresh_process = run_process(workspace, *words.split())
+    expected = [
+        text.replace("python -m harness", "friction-fmus") for text in (fresh_process.stdout, fresh_process.stderr)
+    ]
+    assert (forked_process.returncode, [forked_process.stdout, forked_process.stderr]) == (
+        fresh_process.returncode,
+        expected,
+    )
 
 
 @pytest.mark.slow
@@ -216,15 +221,15 @@ CAMPAIGN = re.compile(r"python -m benchmarks\.campaigns\.(\w+)([^`]*)`")
 
 def find_campaigns(page):
     """Return names and arguments of the campaigns of a page; a line of the text may end in the command."""
-    found = CAMPAIGN.findall(page.read_text(encoding="utf-8"))
-    return {(name, " ".join(arguments.split())) for name, arguments in found}
+    matches = CAMPAIGN.findall(page.read_text(encoding="utf-8"))
+    return {(name, " ".join(arguments.split())) for name, arguments in matches}
 
 
 def test_each_campaign_on_a_page_exists_and_names_its_seed():
     """So that its table can be made again."""
-    found = {campaign for page in PAGES for campaign in find_campaigns(DOCS / page)}
-    assert {name for name, _ in found} >= {"fit_campaign", "decay_defects", "low_speed_friction", "curve_coverage"}
-    for name, arguments in found:
+    campaigns = {campaign for page in PAGES for campaign in find_campaigns(DOCS / page)}
+    assert {name for name, _ in campaigns} >= {"fit_campaign", "decay_defects", "low_speed_friction", "curve_coverage"}
+    for name, arguments in campaigns:
         assert (ROOT / "benchmarks" / "campaigns" / f"{name}.py").is_file()
         assert re.fullmatch(SEEDS.get(name, ".*").strip(), arguments), f"{name} {arguments}: name the seed"
 
@@ -241,9 +246,9 @@ def test_each_campaign_has_the_same_arguments_everywhere():
 def errors_of_rest(t, x, y):
     """Return the errors of time and position of the rest of the model puck, by its certified result."""
     (_, start), (rest, _) = np.loadtxt(ROOT / "fmus" / "more" / "puck-events.csv", delimiter=",", skiprows=1).tolist()
-    certified = np.loadtxt(ROOT / "fmus" / "more" / "puck.csv", delimiter=",", skiprows=2)[-1]
+    certified_row = np.loadtxt(ROOT / "fmus" / "more" / "puck.csv", delimiter=",", skiprows=2)[-1]
     assert start == 1.0
-    return abs(t - rest), np.hypot(x - certified[1], y - certified[2])
+    return abs(t - rest), np.hypot(x - certified_row[1], y - certified_row[2])
 
 
 @pytest.mark.slow
@@ -271,13 +276,13 @@ def test_the_errors_of_friction_in_a_plane_on_the_page_are_those_of_runs():
     rows["a contact for each axis"] = errors_of_rest(max(times), times[0], 0.5 * times[1])
     page = (DOCS / "explanation" / "accuracy.md").read_text(encoding="utf-8")
     for name, errors in rows.items():
-        stated = re.search(rf"\| {name} \| (\S+) \| (\S+) \|", page).groups()
-        assert [float(number) for number in stated] == pytest.approx(errors, rel=0.3, abs=1e-12), name
+        stated_errors = re.search(rf"\| {name} \| (\S+) \| (\S+) \|", page).groups()
+        assert [float(number) for number in stated_errors] == pytest.approx(errors, rel=0.3, abs=1e-12), name
 
 
 def test_the_errors_of_the_magic_formula_on_the_page_are_those_of_default_runs(fmus):
     text = (DOCS / "explanation" / "accuracy.md").read_text(encoding="utf-8")
-    widths, stated = re.search(r"\| magic formula, x_m = (.*?) m/s \|.*\| (.*?) \|\n", text).groups()
+    widths, stated_errors = re.search(r"\| magic formula, x_m = (.*?) m/s \|.*\| (.*?) \|\n", text).groups()
     summary = re.search(r"`pacejka` \| radau9 \| (\S+) of the states", text)[1]
     errors = []
     for width in widths.split(" / "):
@@ -288,7 +293,7 @@ def test_the_errors_of_the_magic_formula_on_the_page_are_those_of_default_runs(f
         errors.append(
             max(np.abs(run[name][rows] - y).max() / np.abs(y).max() for name, y in zip("xv", states, strict=True))
         )
-    assert [f"{error:.2g}" for error in errors] == [f"{float(number):.2g}" for number in stated.split(" / ")]
+    assert [f"{error:.2g}" for error in errors] == [f"{float(number):.2g}" for number in stated_errors.split(" / ")]
     assert f"{max(errors):.0e}".replace("e-0", "e-") == summary
 
 
@@ -303,13 +308,13 @@ def test_generated_tables_are_up_to_date(fmus, environment, monkeypatch):
 
 def test_the_page_on_architecture_quotes_the_numerics_as_they_are():
     """Its other texts are outputs of commands, which run with the page."""
-    (quoted,) = [
+    (quotation,) = [
         block.text
         for block in scripts.find_blocks((DOCS / "explanation" / "architecture.md").read_text(encoding="utf-8"))
         if block.language == "text" and "model.rates(" in block.text and "modes)" in block.text
     ]
     lines = {line.strip() for line in (ROOT / "fmus" / "runtime" / "ode23.py").read_text(encoding="utf-8").splitlines()}
-    assert set(quoted.splitlines()) <= lines
+    assert set(quotation.splitlines()) <= lines
 
 
 def test_each_picture_is_used_and_small():
@@ -332,19 +337,19 @@ def test_notebook_runs(workspace, environment):
     nbclient = pytest.importorskip("nbclient", reason="extra docs")
     nbformat = pytest.importorskip("nbformat", reason="extra docs")
     notebook = nbformat.read(DOCS / "tutorials" / "python_api.ipynb", as_version=4)
-    ((passed, total),) = shown = count_endings(notebook)
-    assert passed == total
+    ((n_passed, total),) = endings = count_endings(notebook)
+    assert n_passed == total
     client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(workspace)}})
     client.execute(env={**environment, "MPLBACKEND": "agg"})  # the figures are drawn, but not painted
-    assert count_endings(notebook) == shown
+    assert count_endings(notebook) == endings
 
 
 @pytest.mark.slow
 def test_site_builds_without_warnings(tmp_path):
     pytest.importorskip("mkdocs", reason="extra docs")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
-    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
+    assert (result.returncode, result.stderr) == (0, ""), result.stdout + result.stderr
     assert (tmp_path / "reference" / "commands" / "index.html").is_file()
     pages = [(tmp_path / "reference" / name / "index.html").read_text("utf-8") for name in ("python", "python_results")]
     assert [name for name in harness.__all__ if f'id="harness.{name}"' not in "".join(pages)] == []

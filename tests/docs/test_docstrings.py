@@ -30,15 +30,15 @@ def signature_names(node):
 
 @pytest.mark.parametrize("package", ["fmus", "harness"])
 def test_docstrings_describe_parameters_that_exist(package):
-    mistakes, described = [], 0
+    mistakes, n_described = [], 0
     for path in (ROOT / package).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 names = described_parameters(ast.get_docstring(node) or "")
                 existing = signature_names(node)
-                described += len(names)
+                n_described += len(names)
                 mistakes += [
                     f"{path}: {node.name} has no {name}" for name in names if existing and name not in existing
                 ]
-    assert described > 100
+    assert n_described > 100
     assert mistakes == []

@@ -58,8 +58,8 @@ def build_model(tmp_path):
         page = (DOCS / "explanation" / "limits.md").read_text(encoding="utf-8")
         (block,) = [block for block in scripts.find_blocks(page) if block.title == f"{name}.py"]
         (tmp_path / f"{name}.py").write_text(block.text)
-        done = commands.build(f"{name}.py", folder=tmp_path)
-        assert (done.returncode, done.stderr) == (0, "")
+        result = commands.build(f"{name}.py", folder=tmp_path)
+        assert (result.returncode, result.stderr) == (0, "")
         return tmp_path / f"{name}.fmu"
 
     return build_model

@@ -23,8 +23,8 @@ def test_readme_code_blocks_run_and_draw_its_pictures(workspace, environment):
     run_page(README, workspace, environment)
     images = load("make_images")
     _, precision = images.FIGURES_OF_COMMANDS["precision"]
-    timed = r"\w+: \w+"  # the labels of the fastest methods
-    assert_same_texts(DOCS / "images" / "precision.svg", workspace / precision, leave_out=timed)
+    label_pattern = r"\w+: \w+"  # the labels of the fastest methods
+    assert_same_texts(DOCS / "images" / "precision.svg", workspace / precision, leave_out=label_pattern)
     images.plot_stability(workspace / "results/stability/stability.csv", workspace / "stability.svg")
     assert_same_texts(DOCS / "images" / "stability.svg", workspace / "stability.svg")
 
@@ -38,12 +38,12 @@ def test_the_measured_pendulum_gives_the_quoted_output(tmp_path):
     measured_records.write_original(record, tmp_path)
     blocks = scripts.find_blocks(DECAY_PAGE.read_text(encoding="utf-8"))
     (place,) = [i for i, block in enumerate(blocks) if measured_records.ORIGINAL in block.text]
-    command, quoted = blocks[place : place + 2]
+    command, output = blocks[place : place + 2]
     assert command.text.strip() == f"friction-fmus {measured_records.COMMAND}"
-    done = run_process(tmp_path, *measured_records.COMMAND.split())
-    assert done.returncode == 0, done.stderr
+    result = run_process(tmp_path, *measured_records.COMMAND.split())
+    assert result.returncode == 0, result.stderr
     flags = ELLIPSIS | NORMALIZE_WHITESPACE
-    assert OutputChecker().check_output(quoted.text, done.stdout, flags), done.stdout
+    assert OutputChecker().check_output(output.text, result.stdout, flags), result.stdout
     (figure,) = tmp_path.glob("results/decay/*/figure.svg")
     assert_same_texts(DOCS / "images" / "measured.svg", figure)
     amplitude = np.abs(np.loadtxt(record, delimiter=",", skiprows=1)[:, 1]).max()
@@ -61,8 +61,8 @@ def test_the_readme_and_the_first_page_count_the_models_of_fmus_more():
     names = sorted(path.stem for path in (ROOT / "fmus/more").glob("*.py"))
     count = {9: "nine", 10: "ten", 11: "eleven"}[len(names)]
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    (listed,) = re.findall(rf"`friction-fmus build --more` builds {count} more models \((.*?)\)", readme)
-    assert sorted(re.findall("`(.*?)`", listed)) == names
+    (model_list,) = re.findall(rf"`friction-fmus build --more` builds {count} more models \((.*?)\)", readme)
+    assert sorted(re.findall("`(.*?)`", model_list)) == names
     assert f"`fmus/more` has {count} more models" in (ROOT / "docs/index.md").read_text(encoding="utf-8")
 
 

@@ -15,10 +15,10 @@ specification.loader.exec_module(make_records)
 @pytest.mark.parametrize("name", make_records.RECORDS)
 def test_a_shipped_record_is_the_drawn_one_and_says_so(name, tmp_path):
     """Other processors may round a few values to the next step of a sensor."""
-    record, shipped = tmp_path / name, DOCS / "records" / name
+    record, shipped_record = tmp_path / name, DOCS / "records" / name
     record.write_text(make_records.RECORDS[name]())
-    assert "Synthetic record, drawn by docs/make_records.py" in shipped.read_text().splitlines()[0]
-    (heads, values), (other_heads, others) = map(read_table, (shipped, record))
+    assert "Synthetic record, drawn by docs/make_records.py" in shipped_record.read_text().splitlines()[0]
+    (heads, values), (other_heads, others) = map(read_table, (shipped_record, record))
     assert heads == other_heads
     assert values.shape == others.shape
     is_equal = (values == others) | ((values != values) & (others != others))

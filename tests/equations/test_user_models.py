@@ -40,7 +40,7 @@ def built(path, kind):
     """Return the FMU, beside a copy of the file outside the project; for FMI 3.0, whose numerics are those of the
     native FMU, with the default method only. Those of the example models are optimised, as those of users."""
     method_option = ["--method", find_model(path).analysis.method] if kind == "native/fmi3" else []
-    folder = build_user_model(path, *KINDS[kind], *method_option, optimised=path in EXAMPLE_MODELS)
+    folder = build_user_model(path, *KINDS[kind], *method_option, optimise=path in EXAMPLE_MODELS)
     return folder / kind / f"{path.stem}.fmu"
 
 

@@ -32,7 +32,7 @@ def native_folder(case):
     """The native FMU of a case, built as users do; those of other tests are not optimised."""
     require_compiler()
     name, *_ = case
-    return build_once(name, "--native", "--platform", "linux64", optimised=True)
+    return build_once(name, "--native", "--platform", "linux64", optimise=True)
 
 
 @pytest.fixture(scope="module")

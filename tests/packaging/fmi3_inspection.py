@@ -43,10 +43,10 @@ def variables(path):
     """Read every variable before and after setting it."""
     with instance(path) as (fmu, description, _):
         starts, after = {}, {}
-        declared = description.modelVariables
-        for variable in declared:
+        model_variables = description.modelVariables
+        for variable in model_variables:
             starts[variable.name] = repr(read(fmu, variable))
-        for variable in declared:
+        for variable in model_variables:
             if variable.causality in ("parameter", "input"):
                 value = read(fmu, variable)
                 write(fmu, variable, value if variable.type == "Enumeration" else 0.5 * value + 0.0625)
@@ -90,9 +90,9 @@ def factors(path, parameters):
                 point = [*point, force]
                 values_at_point = answers(fmu, smooth, push, point)
                 for index, known in enumerate(knowns):
-                    shifted = [value + NUDGE * (number == index) for number, value in enumerate(point)]
-                    nudged = answers(fmu, smooth, push, shifted)
-                    for unknown, a, b in zip(smooth, values_at_point, nudged, strict=True):
+                    shifted_point = [value + NUDGE * (number == index) for number, value in enumerate(point)]
+                    shifted_values = answers(fmu, smooth, push, shifted_point)
+                    for unknown, a, b in zip(smooth, values_at_point, shifted_values, strict=True):
                         if a != b:
                             row = responses.setdefault(unknown.valueReference, {})
                             row.setdefault(known.valueReference, []).append((b - a) / NUDGE)
@@ -110,9 +110,9 @@ def nominals(path, variable, value):
         for change in (False, True, False):
             if change:
                 write(fmu, by_name[variable], value)
-            _, _, renewed, *_ = fmu.updateDiscreteStates()
+            _, _, has_new_nominals, *_ = fmu.updateDiscreteStates()
             fmu.getNominalsOfContinuousStates(sizes, len(sizes))
-            events.append((renewed, list(sizes)))
+            events.append((has_new_nominals, list(sizes)))
     return events
 
 

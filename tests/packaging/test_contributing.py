@@ -35,8 +35,8 @@ def run_line(line, folder):
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = os.environ | {"PATH": path, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
     environment.pop("PYTEST_ADDOPTS", None)  # chooses tests of this run
-    done = subprocess.run(line, shell=True, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+    result = subprocess.run(line, shell=True, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, f"{line}\n{result.stdout}{result.stderr}"
 
 
 def apply_change(text, change):

@@ -11,7 +11,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 OWN_NAME = PROJECT["name"]
 
 
-def normalized(name):
+def normalize(name):
     """Return the name of a package as in PEP 503."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
@@ -20,15 +20,15 @@ def test_the_constraints_name_an_allowed_version_of_every_dependency_with_hashes
     entries = {}
     text = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8").replace("\\\n", "")
     for line in text.splitlines():
-        pinned, *hashes = re.split(r"\s+--hash=", line)
+        specification, *hashes = re.split(r"\s+--hash=", line)
         assert hashes
         assert all(re.fullmatch(r"sha256:[0-9a-f]{64}", digest) for digest in hashes)
-        name, version = pinned.partition(";")[0].strip().split("==")
-        entries.setdefault(normalized(name), []).append(version)
+        name, version = specification.partition(";")[0].strip().split("==")
+        entries.setdefault(normalize(name), []).append(version)
     for text in chain(PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()):
         requirement = Requirement(text)
         if requirement.name != OWN_NAME:
-            versions = entries[normalized(requirement.name)]
+            versions = entries[normalize(requirement.name)]
             assert all(requirement.specifier.contains(version, prereleases=True) for version in versions), text
 
 

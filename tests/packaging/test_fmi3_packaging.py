@@ -31,7 +31,7 @@ from tests.packaging.test_packaging import (  # noqa: F401
 
 SCHEMA = Path(fmpy.__file__).parent / "schema/fmi3"
 DRY = {name for name in model_names() if scalar_class(name).has_dry_friction}
-DRIVEN = {name for name in model_names() if scalar_class(name).has_driver}
+DRIVEN_MODELS = {name for name in model_names() if scalar_class(name).has_driver}
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
 STRUCTURE = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator")
 # Every parameter has an effect, and friction often holds.
@@ -61,7 +61,7 @@ def inspect(fmu, tmp_path_factory):
 def additional_names(name):
     """Return the names of the variables after the declared ones."""
     indicators = ["events.to_rest", "events.to_break_away"] if name in DRY else []
-    return [*indicators, *(["der(x_driver)"] if name in DRIVEN else []), "time"]
+    return [*indicators, *(["der(x_driver)"] if name in DRIVEN_MODELS else []), "time"]
 
 
 def structure(root, kind):
@@ -119,7 +119,7 @@ def test_derivatives_name_their_states_and_follow_the_order_of_the_states(fmu, n
     description = read_model_description(fmu(name))
     rates = [unknown.variable for unknown in description.derivatives]
     outputs = [variable.name for variable in description.modelVariables if variable.causality == "output"]
-    drivers = ["x_driver"] if name in DRIVEN else []
+    drivers = ["x_driver"] if name in DRIVEN_MODELS else []
     assert [rate.derivative.name for rate in rates] == [*outputs[:2], *drivers]
     assert [rate.name for rate in rates] == [*outputs[1:3], *(f"der({state})" for state in drivers)]
     assert [variable for variable in description.modelVariables if variable.derivative] == sorted(
@@ -216,7 +216,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, i
 def test_the_files_are_those_of_fmi3(fmu, name):
     content = read_archive(fmu(name))
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
-    certified = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
+    certified_files = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
     headers = [file for files in (OWN_HEADERS, FMI_HEADERS["3"], ("fmi3.c", "guid.h", "model.h")) for file in files]
     assert all(
         b"2-Clause BSD License" in content[f"sources/{file}"] for file in FMI_HEADERS["3"]
@@ -231,7 +231,7 @@ def test_the_files_are_those_of_fmi3(fmu, name):
         f"binaries/x86_64-linux/{name}.so",
         "resources/model_data.json",
         *(f"sources/{file}" for file in (*headers, "buildDescription.xml")),
-        *(f"extra/org.fmi-standard.fmi-ls-ref/{file}" for file in certified),
+        *(f"extra/org.fmi-standard.fmi-ls-ref/{file}" for file in certified_files),
     }
 
 

@@ -27,7 +27,7 @@ WORK = {  # by command; all run in one folder, in this order
     "references": ["references block.py"],
     "report": ["report"],
 }
-EACH = """\
+COMMANDS_SCRIPT = """\
 import sys
 from harness.commands import commands
 
@@ -67,7 +67,7 @@ def test_every_command_runs_without_extras(without_extras, user):
     native = {"map", "orbit", "sensitivity"}  # they need a native FMU, whose build names the extra
     others = {words.split()[0] for words in EXTRAS} | native
     assert set(WORK) | others == set(commands.commands)
-    output = call(without_extras, "-c", EACH, *(line for lines in WORK.values() for line in lines), cwd=user)
+    output = call(without_extras, "-c", COMMANDS_SCRIPT, *(line for lines in WORK.values() for line in lines), cwd=user)
     assert "mpmath" not in output
 
 
@@ -87,8 +87,8 @@ def test_the_named_command_adds_an_extra_to_a_clone_and_to_a_wheel(wheel, tmp_pa
     install(["-e", ROOT] if form == "clone" else [wheel], environment)
     pip = (sys.executable, "-m", "pip", "--python", environment / "bin" / "python", "install", "--no-index")
     output = call(*pip, f"friction-fmus[{','.join(extras)}]", cwd=tmp_path)
-    satisfied = re.search(r"Requirement already satisfied: friction-fmus\[([\w,-]+)\]", output)
-    assert sorted(satisfied[1].split(",")) == extras
+    requirement = re.search(r"Requirement already satisfied: friction-fmus\[([\w,-]+)\]", output)
+    assert sorted(requirement[1].split(",")) == extras
     assert "does not provide the extra" not in output
 
 

@@ -91,8 +91,8 @@ def fmu(build_output):
 
 
 def test_the_command_prints_name_size_and_digest_of_every_model(build_output):
-    out, printed = build_output
-    for name, line in zip(model_names(), printed.splitlines(), strict=True):
+    out, output = build_output
+    for name, line in zip(model_names(), output.splitlines(), strict=True):
         content = (out / f"{name}.fmu").read_bytes()
         size, digest = f"{len(content) / 1000:.0f}", sha256(content).hexdigest()[:16]
         assert re.fullmatch(rf"{name}.fmu +{size} kB  {digest}", line)
@@ -108,9 +108,9 @@ def test_validation_reports_no_problems(fmu, name):
 def test_the_xml_matches_the_declarations(fmu, name):
     scalars = description_of(fmu(name)).findall("ModelVariables/ScalarVariable")
     instance = scalar_class(name)()
-    declared = variables(instance) + variables(RunState(instance))
-    force = next((variable for variable, meaning in declared if meaning.role == "contact"), "")
-    for index, (scalar, (variable, meaning)) in enumerate(zip(scalars, declared, strict=True)):
+    declarations = variables(instance) + variables(RunState(instance))
+    force = next((variable for variable, meaning in declarations if meaning.role == "contact"), "")
+    for index, (scalar, (variable, meaning)) in enumerate(zip(scalars, declarations, strict=True)):
         value = scalar[0]
         text = f"mode of {force}: {meaning.text}" if variable == "mode" else meaning.text
         assert (scalar.get("name"), scalar.get("valueReference"), value.tag) == (variable, str(index), meaning.type)
@@ -240,12 +240,12 @@ def test_both_licences_are_packed(fmu, name):
 def test_the_source_date_changes_only_the_date(fmu, tmp_path):
     name, moment = model_names()[0], datetime(2024, 2, 29, 12, 30, 14, tzinfo=UTC)
     assert command(name, "--out", tmp_path, SOURCE_DATE_EPOCH=str(int(moment.timestamp()))).returncode == 0
-    dated, original = tmp_path / f"{name}.fmu", fmu(name)
-    with ZipFile(dated) as archive:
+    dated_fmu, original = tmp_path / f"{name}.fmu", fmu(name)
+    with ZipFile(dated_fmu) as archive:
         assert {info.date_time for info in archive.infolist()} == {(2024, 2, 29, 12, 30, 14)}
     stamp = description_of(original).get("generationDateAndTime")
-    replaced = read_archive(original)["modelDescription.xml"].replace(stamp.encode(), b"2024-02-29T12:30:14Z")
-    assert read_archive(dated) == read_archive(original) | {"modelDescription.xml": replaced}
+    dated_description = read_archive(original)["modelDescription.xml"].replace(stamp.encode(), b"2024-02-29T12:30:14Z")
+    assert read_archive(dated_fmu) == read_archive(original) | {"modelDescription.xml": dated_description}
 
 
 @pytest.mark.parametrize("arguments", [("bogus",), ("smd", "bogus")])
@@ -287,8 +287,8 @@ def test_an_invalid_source_date_is_refused(epoch, tmp_path):
 
 
 def test_a_missing_pythonfmu_error_says_what_to_install(tmp_path):
-    hidden = "import runpy, sys; sys.modules['pythonfmu'] = None; runpy.run_path(sys.argv.pop(1), run_name='__main__')"
-    call = [sys.executable, "-c", hidden, str(ROOT / "build_fmus.py"), "smd", "--out", str(tmp_path)]
+    script = "import runpy, sys; sys.modules['pythonfmu'] = None; runpy.run_path(sys.argv.pop(1), run_name='__main__')"
+    call = [sys.executable, "-c", script, str(ROOT / "build_fmus.py"), "smd", "--out", str(tmp_path)]
     run = subprocess.run(call, capture_output=True, text=True, cwd=ROOT, timeout=60)
     assert run.returncode == 1
     assert run.stderr.startswith("Error: pythonfmu is not installed")
@@ -298,11 +298,11 @@ def test_a_missing_pythonfmu_error_says_what_to_install(tmp_path):
 
 def test_an_archive_does_not_depend_on_the_order_of_its_entries():
     entries = {"model.png": b"an icon", "binaries/linux64/a.so": b"a library"}
-    one, other = (
+    archive, other_archive = (
         zip_entries(dict(order), datetime(2026, 1, 1, tzinfo=UTC))
         for order in (entries.items(), reversed(entries.items()))
     )
-    assert one == other
+    assert archive == other_archive
 
 
 def test_a_failed_write_leaves_the_previous_fmu_and_nothing_else(tmp_path, monkeypatch):
@@ -366,10 +366,10 @@ class Sketch(Oscillator):
     solver_class = Integrator
 
 
-def sketch(**declared):
+def sketch(**declarations):
     """Return the description of a model with these variables."""
-    model_class = type("Sketch", (Sketch,), {"__doc__": Sketch.__doc__} | declared)
-    for name, meaning in declared.items():
+    model_class = type("Sketch", (Sketch,), {"__doc__": Sketch.__doc__} | declarations)
+    for name, meaning in declarations.items():
         meaning.__set_name__(model_class, name)
     return describe(model_class, "sketch", "code", datetime(2024, 1, 1, tzinfo=UTC)).decode()
 

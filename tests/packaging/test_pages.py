@@ -68,8 +68,8 @@ def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_g
     kinds = [
         content("stickslip"),
         *(
-            read_archive(built() / "stickslip.fmu")
-            for built in (native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus)
+            read_archive(build() / "stickslip.fmu")
+            for build in (native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus)
         ),
     ]
     for files in kinds:
@@ -98,7 +98,7 @@ class Reader(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.words, self.headings, self.referred = [], [], [], []
+        self.open, self.words, self.headings, self.references = [], [], [], []
         self.feed(text)
         self.close()
         self.text = " ".join("".join(self.words).split())
@@ -106,14 +106,14 @@ class Reader(HTMLParser):
     def handle_starttag(self, tag, attributes):
         if tag not in VOID:
             self.open.append(tag)
-        self.referred += [value for key, value in attributes if key in ("src", "href")]
+        self.references += [value for key, value in attributes if key in ("src", "href")]
 
     def handle_startendtag(self, tag, attributes):
         """An element of a drawing."""
 
     def handle_endtag(self, tag):
-        omitted = ("p", "td", "tr", "th")
-        while self.open[-1] != tag and self.open[-1] in omitted:
+        optional_tags = ("p", "td", "tr", "th")
+        while self.open[-1] != tag and self.open[-1] in optional_tags:
             self.open.pop()
         assert self.open.pop() == tag
 
@@ -150,13 +150,13 @@ def test_an_angle_is_drawn_in_the_unit_that_its_label_names(content):
 
 @EVERY_MODEL
 def test_the_page_is_self_contained(content, name):
-    carried = content(name)
-    text = carried[PAGE].decode()
+    files = content(name)
+    text = files[PAGE].decode()
     assert "http" not in text.lower()
     assert "<script" not in text
-    for target in Reader(text).referred:
+    for target in Reader(text).references:
         path = target.removeprefix("../") if target.startswith("../") else f"documentation/{target}"
-        assert [file for file in carried if file.startswith(path)]
+        assert [file for file in files if file.startswith(path)]
 
 
 @pytest.mark.parametrize("name", WITH["png"])
@@ -169,15 +169,15 @@ def test_the_icon_is_a_square_picture_of_some_size(content, name):
 
 @pytest.mark.parametrize("name", WITH["csv"])
 def test_the_manifest_names_the_certified_result_and_its_origin(content, name):
-    carried = content(name)
-    root = ElementTree.fromstring(carried[f"{EXTRA}fmi-ls-manifest.xml"])
+    files = content(name)
+    root = ElementTree.fromstring(files[f"{EXTRA}fmi-ls-manifest.xml"])
     assert root.tag == "fmiReferences"
     assert root.get(f"{NAMESPACE}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
     assert root.get(f"{NAMESPACE}fmi-ls-version")
-    (related,) = root.findall("Related")
-    assert (related.get("role"), related.get("type")) == ("result", "text/csv")
-    assert f"{EXTRA}{related.get('source')}" in carried
-    assert re.search(r"difference [\d.]+e-1[0-9]\.", related.get("description"))
+    (element,) = root.findall("Related")
+    assert (element.get("role"), element.get("type")) == ("result", "text/csv")
+    assert f"{EXTRA}{element.get('source')}" in files
+    assert re.search(r"difference [\d.]+e-1[0-9]\.", element.get("description"))
 
 
 @pytest.mark.parametrize("name", WITH["csv"])
@@ -189,11 +189,11 @@ def test_the_fmu_reproduces_its_certified_result(content, launch, name):
     table = [[float(word) for word in row] for row in rows]
     times = [row[0] for row in table]
     assert (times[0], times[-1]) == (0.0, model_class(name).stop_time)
-    computed = launch(name, stop=times[-1]).run(times, heads[1:])
-    allowed = {"pacejka": 1e-6, "pendulum": 1e-9}.get(name, 1e-13)
-    for column, expected in zip(zip(*computed, strict=True), list(zip(*table, strict=True))[1:], strict=True):
+    computed_rows = launch(name, stop=times[-1]).run(times, heads[1:])
+    tolerance = {"pacejka": 1e-6, "pendulum": 1e-9}.get(name, 1e-13)
+    for column, expected in zip(zip(*computed_rows, strict=True), list(zip(*table, strict=True))[1:], strict=True):
         largest = max(map(abs, expected))
-        assert max(abs(a - b) for a, b in zip(column, expected, strict=True)) <= allowed * largest
+        assert max(abs(a - b) for a, b in zip(column, expected, strict=True)) <= tolerance * largest
 
 
 def test_a_model_without_a_certified_result_has_a_page():

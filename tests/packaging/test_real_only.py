@@ -86,9 +86,9 @@ def test_results_state_the_method_and_the_law_that_the_build_fixed(folders):
 @FMI2
 def test_commands_work_with_the_choices_of_the_build(folders):
     fmu = folders[1] / "coulomb.fmu"
-    described = describe(fmu)
-    assert (described.laws, described.methods) == (("hybrid",), ("exact",))
-    assert "Friction laws (friction): hybrid; fixed by the build" in str(described)
+    description = describe(fmu)
+    assert (description.laws, description.methods) == (("hybrid",), ("exact",))
+    assert "Friction laws (friction): hybrid; fixed by the build" in str(description)
     assert simulate(fmu, {"friction": "hybrid"}, method="exact").settings_label == "exact, hybrid"
     with pytest.raises(SceneError, match=r"solver.method = 'ode23': coulomb.fmu was built with exact only; remove it"):
         simulate(fmu, method="ode23")
@@ -133,7 +133,7 @@ def test_a_host_that_repeats_its_mistake_gets_one_message(fmus, worker):
     ],
 )
 def test_options_that_contradict_are_refused(tmp_path, options, sentence):
-    done = build("coulomb", "--real-only", *options, "--out", tmp_path)
-    assert done.returncode in (1, 2)
-    assert sentence in done.stderr
+    result = build("coulomb", "--real-only", *options, "--out", tmp_path)
+    assert result.returncode in (1, 2)
+    assert sentence in result.stderr
     assert not [*tmp_path.iterdir()]

@@ -45,6 +45,6 @@ def test_the_release_holds_every_kind_and_correct_checksums(build_release, tmp_p
 
 
 def test_release_takes_no_other_options(tmp_path):
-    done = CliRunner().invoke(build_fmus.main, ["smd", "--release", str(tmp_path)])
-    assert done.exit_code == 2
-    assert "--release builds everything" in done.output
+    result = CliRunner().invoke(build_fmus.main, ["smd", "--release", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "--release builds everything" in result.output

@@ -14,19 +14,19 @@ import build_fmus
 def stages(tmp_path_factory):
     """The folder with the texts of all models."""
     folder = tmp_path_factory.mktemp("stages")
-    done = CliRunner().invoke(build_fmus.main, [*MODELS, "--stages", str(folder)])
-    assert done.exit_code == 0, done.output
-    assert done.output.split() == [str(folder / name) for name in MODELS]
+    result = CliRunner().invoke(build_fmus.main, [*MODELS, "--stages", str(folder)])
+    assert result.exit_code == 0, result.output
+    assert result.output.split() == [str(folder / name) for name in MODELS]
     return folder
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_lowered_texts_are_those_inside_the_fmu(stages, fmus, name):
-    lowered = stages / name / "3-lowered"
+    lowered_folder = stages / name / "3-lowered"
     with ZipFile(fmus / f"{name}.fmu") as archive:
         package = next(path for path in archive.namelist() if path.endswith("/runtime/integrator.py")).split("/")[1]
         for path in (f"{name}.py", "runtime/integrator.py", "runtime/ode23.py"):
-            assert archive.read(f"resources/{package}/{path}").decode() == (lowered / path).read_text()
+            assert archive.read(f"resources/{package}/{path}").decode() == (lowered_folder / path).read_text()
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -46,7 +46,7 @@ def test_the_analysis_states_load_limit_and_derivatives(stages):
 
 @pytest.mark.parametrize("option", ["--native", "--web", "--fmi=3", "--out=elsewhere", "--platform=linux64"])
 def test_options_of_a_build_are_refused(tmp_path, option):
-    done = CliRunner().invoke(build_fmus.main, ["smd", "--stages", str(tmp_path / "stages"), option])
-    assert done.exit_code == 2
-    assert "remove" in done.output
+    result = CliRunner().invoke(build_fmus.main, ["smd", "--stages", str(tmp_path / "stages"), option])
+    assert result.exit_code == 2
+    assert "remove" in result.output
     assert not (tmp_path / "stages").exists()

@@ -7,7 +7,7 @@ from build_cache import ROOT
 
 # Modules with an algorithm, a file format or a process whose claims need no run of an FMU, or cannot be seen in one.
 # Remove a module when its last import goes; add none: test a new function through `harness` or a command.
-ALLOWED = """
+ALLOWED_MODULES = """
 .: __main__ commands
 analyses.decay: decay_problem decrement intervals signal_model
 analyses.fit: fit_problem fit_procedure measured_record profile_likelihood
@@ -27,7 +27,7 @@ studies.sweep: dispatch result
 
 def allowed_modules():
     modules, package = set(), ""
-    for word in ALLOWED.split():
+    for word in ALLOWED_MODULES.split():
         if word.endswith(":"):
             package = "harness" if word == ".:" else f"harness.{word[:-1]}"
         else:

@@ -22,7 +22,7 @@ def wheel(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def installed(wheel, tmp_path_factory):
+def installation(wheel, tmp_path_factory):
     """A Python with the wheel, and its site-packages, which are read-only."""
     folder = tmp_path_factory.mktemp("environment")
     site_packages = make_environment(folder, "native")
@@ -36,9 +36,9 @@ def installed(wheel, tmp_path_factory):
 
 
 @pytest.fixture
-def run(installed, tmp_path):
+def run(installation, tmp_path):
     """Return run(words, ...): the output of `python -m words` in an empty folder; the installation must not change."""
-    python, site_packages = installed
+    python, site_packages = installation
     before = content(site_packages)
     yield lambda words, **environment: call(python, "-m", *words.split(), cwd=tmp_path, **environment)
     assert content(site_packages) == before  # root may write read-only files
@@ -60,14 +60,14 @@ def test_the_wheel_holds_sources_and_data_and_no_fmu(wheel):
 
 def test_the_licence_is_in_the_wheel(wheel):
     with ZipFile(wheel) as archive:
-        (carried,) = [path for path in archive.namelist() if Path(path).name == "LICENSE"]
-        assert archive.read(carried) == (ROOT / "LICENSE").read_bytes()
+        (licence,) = [path for path in archive.namelist() if Path(path).name == "LICENSE"]
+        assert archive.read(licence) == (ROOT / "LICENSE").read_bytes()
 
 
 def test_the_wheel_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folder(run, fmus, tmp_path):
     """From files with another location and time; one model without a contact and one with a contact."""
-    printed = run("build_fmus pacejka stickslip", PYTHONHASHSEED="7", TZ="Pacific/Auckland")
-    assert [line.split()[0] for line in printed.splitlines()] == ["pacejka.fmu", "stickslip.fmu"]
+    output = run("build_fmus pacejka stickslip", PYTHONHASHSEED="7", TZ="Pacific/Auckland")
+    assert [line.split()[0] for line in output.splitlines()] == ["pacejka.fmu", "stickslip.fmu"]
     built_files = {path.relative_to(tmp_path).as_posix(): path.read_bytes() for path in tmp_path.rglob("*.fmu")}
     assert built_files == {f"fmus/{name}.fmu": (fmus / f"{name}.fmu").read_bytes() for name in ("pacejka", "stickslip")}
     assert "stickslip" in run("harness run stickslip")
@@ -82,7 +82,7 @@ def test_native_builds_differ_from_those_of_the_sources_only_in_the_date(run, tm
     run("build_fmus --native smd --method exact", ZIG_LOCAL_CACHE_DIR=tmp_path / "own", SOURCE_DATE_EPOCH="1700000000")
     rebuilt = read_archive(tmp_path / "fmus" / "native" / "smd.fmu")
     assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in DEFAULT_PLATFORMS} <= set(rebuilt)
-    dated = rebuilt["modelDescription.xml"]
-    undated = dated.replace(b"2023-11-14T22:13:20Z", f"{__date__}T00:00:00Z".encode())
-    assert dated != undated
-    assert rebuilt | {"modelDescription.xml": undated} == {name: expected[name] for name in rebuilt}
+    description = rebuilt["modelDescription.xml"]
+    original_description = description.replace(b"2023-11-14T22:13:20Z", f"{__date__}T00:00:00Z".encode())
+    assert description != original_description
+    assert rebuilt | {"modelDescription.xml": original_description} == {name: expected[name] for name in rebuilt}

@@ -54,8 +54,8 @@ def test_every_format_of_a_decay_is_the_same_record(tmp_path, form):
 @pytest.mark.parametrize("form", [form for form in FORMATS if form.refusal], ids=lambda form: form.file)
 def test_a_refused_format_has_its_message(tmp_path, form):
     options = [f"--{name.replace('_', '-')}={value}" for name, value in form.options.items()]
-    done = commands.harness(tmp_path, "decay", write(tmp_path, form).name, *options)
-    assert (done.returncode, done.stderr) == (2, f"Error: {form.refusal}\n")
+    result = commands.harness(tmp_path, "decay", write(tmp_path, form).name, *options)
+    assert (result.returncode, result.stderr) == (2, f"Error: {form.refusal}\n")
 
 
 @pytest.mark.slow

@@ -44,9 +44,9 @@ def test_a_unit_in_brackets_at_the_end_is_found_after_any_name():
 
 
 def test_any_headings_give_a_record_or_a_message(tmp_path):
-    path, drawn = tmp_path / "headings.csv", headings(100)
+    path, drawn_headings = tmp_path / "headings.csv", headings(100)
     rows = "\n".join(f"{i / 10},{i % 7}" for i in range(20))
-    for first, second in zip(drawn[::2], drawn[1::2], strict=True):
+    for first, second in zip(drawn_headings[::2], drawn_headings[1::2], strict=True):
         path.write_text(f"{first},{second}\n{rows}", encoding="utf-8")
         with contextlib.suppress(HarnessError):
             assert len(read_record(path).t) == 20

@@ -48,7 +48,7 @@ def phone():
     return head + "\n" + rows(T, *noise, a, np.hypot(a, noise[0]), form="{:.9E}")
 
 
-def stamped():
+def timestamped_text():
     start = np.datetime64("2026-11-21T23:59:58.000")
     stamps = [str(start + np.timedelta64(round(1000 * t), "ms")) + "Z" for t in T]
     return "timestamp,angle (deg)\n" + rows(stamps, np.degrees(motion(sine=True)))
@@ -77,7 +77,7 @@ def logger():
     return "t [s],x [mm]\n" + rows(np.round(t, 2), 1e3 * motion(t=t))
 
 
-def quoted():
+def quoted_text():
     return "\n".join(f'"{t:.9g}","{1e3 * x:.9g}"'.replace(".", ",") for t, x in zip(T, X, strict=True))
 
 
@@ -95,7 +95,7 @@ FILES = {
     "tabs.tsv": lambda: text_of("time\tx [m]\n" + rows(T, X, mark="\t")),
     "tabs-commas.txt": lambda: text_of("Time (ms)\tlaser (cm)\n" + rows(1e3 * T, 100 * X, mark="\t", comma=True)),
     "blanks.dat": lambda: text_of("t x[m]\n" + rows(T, X, mark="   ")),
-    "quoted-decimal-commas.csv": lambda: text_of('"t [s]","x [mm]"\n' + quoted()),
+    "quoted-decimal-commas.csv": lambda: text_of('"t [s]","x [mm]"\n' + quoted_text()),
     "windows-lines.csv": lambda: text_of(("t [s],x [mm]\n" + rows(T, 1e3 * X)).replace("\n", "\r\n")),
     "utf8-mark.csv": lambda: text_of("t [s],x [µm]\n" + rows(T, 1e6 * X), "utf-8-sig"),
     "utf16.txt": lambda: text_of("t [s]\tx [mm]\n" + rows(T, 1e3 * X, mark="\t"), "utf-16"),
@@ -107,7 +107,7 @@ FILES = {
     "no-heading.csv": lambda: text_of(rows(T, 1e3 * X)),
     "index.csv": lambda: text_of(",time,x [mm]\n" + rows([str(i) for i in range(len(T))], T, 1e3 * X)),
     "time-second.csv": lambda: text_of("x [mm],t [s]\n" + rows(1e3 * X, T)),
-    "stamps.csv": lambda: text_of(stamped()),
+    "stamps.csv": lambda: text_of(timestamped_text()),
     "logger.csv": lambda: text_of(logger()),
     "holes.csv": lambda: text_of(holes()),
     "gap.csv": lambda: text_of(gap()),
@@ -266,8 +266,8 @@ NOTATIONS = {  # and the options of its reader; all hold the same motion
 @pytest.mark.parametrize("name", NOTATIONS)
 def test_numbers_and_times_are_read_in_any_notation(tmp_path, name):
     path, (content, options) = tmp_path / "record", NOTATIONS[name]
-    written = content()
-    path.write_bytes(written.encode() if isinstance(written, str) else written)
+    data = content()
+    path.write_bytes(data.encode() if isinstance(data, str) else data)
     record = read_record(path, **options)
     assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
     assert ("a table in several sheets" in " ".join(record.notes)) == (name == "the longest sheet")
@@ -399,7 +399,7 @@ def test_a_heading_is_matched_literally(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("written", "order", "base", "size"),
+    ("unit", "order", "base", "size"),
     [
         ("m/s^2", 2, "m", 1.0),
         ("m/s²", 2, "m", 1.0),
@@ -419,9 +419,9 @@ def test_a_heading_is_matched_literally(tmp_path):
         ("Degrees/s^2", 2, "rad", np.pi / 180),
     ],
 )
-def test_a_unit_identifies_the_quantity(tmp_path, written, order, base, size):
+def test_a_unit_identifies_the_quantity(tmp_path, unit, order, base, size):
     path = tmp_path / "record.csv"
-    path.write_text(f"t [s],x [{written}]\n" + rows(T, X))
+    path.write_text(f"t [s],x [{unit}]\n" + rows(T, X))
     record = read_record(path)
     assert (record.order, record.unit) == (order, base + ("", "/s", "/s2")[order])
     assert record.x == pytest.approx(size * X, rel=1e-6, abs=1e-8 * size)

@@ -172,22 +172,22 @@ def test_saturation_is_long_stays_at_one_value_that_is_seldom_approached(stays, 
 
 def test_the_largest_value_of_one_peak_or_of_no_motion_is_not_saturation():
     record = swing()
-    held = np.concatenate([np.full(400, record.x.max()), record.x[:-400]])
-    assert find_saturated(held)[1] == find_saturated(np.ones_like(record.x))[1] == 0
+    plateau = np.concatenate([np.full(400, record.x.max()), record.x[:-400]])
+    assert find_saturated(plateau)[1] == find_saturated(np.ones_like(record.x))[1] == 0
 
 
 def test_rows_in_no_order_are_sorted_and_reported():
     """Falling times, whole parts that are exchanged, and shuffled rows; two runs in one table keep their order."""
     t = np.arange(40) * 0.25
     for order in (np.arange(40)[::-1], np.roll(np.arange(40), 15), np.random.default_rng(1).permutation(40)):
-        found, sentence = sort_times(t[order])
-        assert (t[order][found] == t).all()
+        rows, sentence = sort_times(t[order])
+        assert (t[order][rows] == t).all()
         assert "The rows are not in the order of time" in sentence
     touching = np.concatenate([np.linspace(5.0, 10.0, 200), np.linspace(0.0, 5.0, 200)])  # the parts share one time
     assert (touching[sort_times(touching)[0]] == np.sort(touching)).all()
     for times in (t, np.concatenate([t, t + 0.1]), np.concatenate([t, t])):
-        found, sentence = sort_times(times)
-        assert (found == np.arange(len(times))).all()
+        rows, sentence = sort_times(times)
+        assert (rows == np.arange(len(times))).all()
         assert sentence == ""
 
 
@@ -197,11 +197,11 @@ def test_a_single_time_that_steps_back_and_repeated_times_do_not_refuse_a_record
     x = np.exp(-0.1 * t) * np.cos(10 * t)
     t[7500], t[7501] = t[7501], t[7500]
     x[7500], x[7501] = x[7501], x[7500]
-    repeated = np.arange(1000, 12_000, 1000)
-    t[repeated] = t[repeated - 1]
+    repeated_rows = np.arange(1000, 12_000, 1000)
+    t[repeated_rows] = t[repeated_rows - 1]
     record = read(tmp_path, t, x)
     assert (np.diff(record.t) > 0).all()
-    assert len(record.t) == len(t) - len(repeated)
+    assert len(record.t) == len(t) - len(repeated_rows)
     texts = "\n".join(record.notes)
     assert "The rows are not in the order of time (1 time falls): they are sorted." in texts
-    assert f"{len(repeated)} of {len(t)} samples are left out." in texts
+    assert f"{len(repeated_rows)} of {len(t)} samples are left out." in texts

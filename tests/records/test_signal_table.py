@@ -10,7 +10,7 @@ from harness import SceneError, read_record
 from harness.records.columns import ColumnOptions
 from harness.records.record import SignalSource, load_record
 
-WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
+SOURCES = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_columns_are_converted_and_incomplete_rows_skipped(tmp_path):
     table = rows()
     table[5] = (52, "NaN", 0.05, 7)
     table[9] = (90, 1.0, "", 7)
-    signals = load_record(write(tmp_path / "a.csv", table), ColumnOptions()).signals(WANTED)
+    signals = load_record(write(tmp_path / "a.csv", table), ColumnOptions()).signals(SOURCES)
     complete_rows = [row for i, row in enumerate(table) if i not in (5, 9)]
     assert signals.t == pytest.approx([1e-3 * row[0] for row in complete_rows])
     assert signals.columns["x"] == pytest.approx([1e-3 * row[1] for row in complete_rows])
@@ -75,7 +75,7 @@ def test_a_second_run_beside_the_first_is_not_read(tmp_path):
     heading = "t [s],laser [mm],load (kN),t [s],laser [mm],load (kN)\n"
     table = [(0.01 * i, i % 7, 0.1, 0.02 * i, -1, -1) for i in range(30)]
     table += [("", "", "", 0.02 * i, -1, -1) for i in range(30, 40)]
-    signals = load_record(write(tmp_path / "a.csv", table, heading), ColumnOptions()).signals(WANTED)
+    signals = load_record(write(tmp_path / "a.csv", table, heading), ColumnOptions()).signals(SOURCES)
     assert len(signals.t) == 30
     assert signals.columns["F"] == pytest.approx(np.full(30, 100.0))
 
@@ -112,11 +112,11 @@ def check_signal(path, options, unit):
     columns = ColumnOptions(**{name: value for name, value in options.items() if name in names})
     with pytest.raises(SceneError, match="unknown column 'nosuch'") as refusal:
         load_record(str(path), columns).signals({"x": SignalSource("nosuch", unit)})
-    added = " [mm]" if "unit" in options else ""  # a unit that the file lacks
+    unit_suffix = " [mm]" if "unit" in options else ""  # a unit that the file lacks
     equal = []
     for heading in str(refusal.value).split("allowed: ")[1].split(", "):
         with contextlib.suppress(SceneError):
-            signals = load_record(str(path), columns).signals({"x": SignalSource(heading + added, unit)})
+            signals = load_record(str(path), columns).signals({"x": SignalSource(heading + unit_suffix, unit)})
             if len(signals.t) == len(record.t) and signals.columns["x"] == pytest.approx(record.x, rel=1e-14):
                 equal.append(signals)
     assert equal, "no column agrees with the record"
@@ -128,10 +128,10 @@ def check_signal(path, options, unit):
 
 def test_a_range_of_times_and_a_rate_select_samples(tmp_path):
     file = write(tmp_path / "a.csv", rows())
-    signals = load_record(file, ColumnOptions(begin=0.1, end=0.25)).signals(WANTED)
+    signals = load_record(file, ColumnOptions(begin=0.1, end=0.25)).signals(SOURCES)
     assert signals.t[0] >= 0.1
     assert signals.t[-1] <= 0.25
-    assert load_record(file, ColumnOptions(rate=200.0)).signals(WANTED).t[1] == pytest.approx(0.005)
+    assert load_record(file, ColumnOptions(rate=200.0)).signals(SOURCES).t[1] == pytest.approx(0.005)
 
 
 def test_a_unit_in_the_request_replaces_that_of_the_file(tmp_path):
@@ -143,19 +143,19 @@ def test_a_unit_in_the_request_replaces_that_of_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "options", "message"),
+    ("sources", "options", "message"),
     [
         ({"x": SignalSource("lasre", "m")}, {}, "laser"),
         ({"x": SignalSource("load", "m")}, {}, "load is in kN, and x of the FMU in m"),
-        (WANTED, {"begin": 0.35}, "at least 12 are required"),
-        (WANTED, {"time": "clock"}, "clock"),
+        (SOURCES, {"begin": 0.35}, "at least 12 are required"),
+        (SOURCES, {"time": "clock"}, "clock"),
     ],
 )
-def test_a_wrong_request_is_refused_in_one_sentence(tmp_path, wanted, options, message):
-    with pytest.raises(SceneError) as refused:
-        load_record(write(tmp_path / "a.csv", rows()), ColumnOptions(**options)).signals(wanted)
-    assert message in str(refused.value)
-    assert "\n" not in str(refused.value)
+def test_a_wrong_request_is_refused_in_one_sentence(tmp_path, sources, options, message):
+    with pytest.raises(SceneError) as refusal:
+        load_record(write(tmp_path / "a.csv", rows()), ColumnOptions(**options)).signals(sources)
+    assert message in str(refusal.value)
+    assert "\n" not in str(refusal.value)
 
 
 def table(tmp_path, text, encoding="utf-8"):
@@ -210,14 +210,14 @@ def test_a_sensor_at_the_end_of_its_range_is_named_and_its_samples_kept(tmp_path
     assert "Weg is exactly 0.6" in signals.notes[0]
 
 
-DRIVEN = {"x": SignalSource("x", "m"), "F": SignalSource("F", "N", is_input=True)}
+DRIVEN_SOURCES = {"x": SignalSource("x", "m"), "F": SignalSource("F", "N", is_input=True)}
 
 
 def driven_table(tmp_path, t, x, force):
     """Return the signals of a record with the input F, read from a file; None makes an empty cell."""
     cells = [["" if value is None else f"{value:.9g}" for value in row] for row in zip(t, x, force, strict=True)]
     (tmp_path / "a.csv").write_text("t [s],x [m],F [N]\n" + "".join(",".join(row) + "\n" for row in cells))
-    return load_record(str(tmp_path / "a.csv"), ColumnOptions()).signals(DRIVEN)
+    return load_record(str(tmp_path / "a.csv"), ColumnOptions()).signals(DRIVEN_SOURCES)
 
 
 def test_an_input_keeps_every_sample_that_a_measured_signal_would_lose(tmp_path):
@@ -227,17 +227,17 @@ def test_an_input_keeps_every_sample_that_a_measured_signal_would_lose(tmp_path)
     force = np.where(np.arange(1200) % 9 < 3, random.uniform(20, 30, 1200).round(3), 0.0)
     force[::100] = -9999.0
     x = np.sin(3 * t)
-    lost = random.choice(np.arange(5, 1190), 40, replace=False)
+    lost_rows = random.choice(np.arange(5, 1190), 40, replace=False)
     for value in (-9999.0, None):
-        signals = driven_table(tmp_path, t, [value if i in lost else x[i] for i in range(1200)], force)
+        signals = driven_table(tmp_path, t, [value if i in lost_rows else x[i] for i in range(1200)], force)
         assert np.array_equal(signals.inputs["F"], force)
         assert signals.input_t == pytest.approx(t)
-        assert signals.t == pytest.approx(np.delete(t, lost))
-        assert signals.columns["x"] == pytest.approx(np.delete(x, lost), abs=1e-8)
+        assert signals.t == pytest.approx(np.delete(t, lost_rows))
+        assert signals.columns["x"] == pytest.approx(np.delete(x, lost_rows), abs=1e-8)
     with pytest.raises(
         SceneError, match=r"818 of 1200 rows have no number for t .* or x or F"
     ):  # the same column as a measured signal
-        load_record(str(tmp_path / "a.csv"), ColumnOptions()).signals({**DRIVEN, "F": SignalSource("F", "N")})
+        load_record(str(tmp_path / "a.csv"), ColumnOptions()).signals({**DRIVEN_SOURCES, "F": SignalSource("F", "N")})
 
 
 @pytest.mark.parametrize(("row", "cells"), [(1, ("0.01", "0.5", "")), (41, ("", "0.5", "1"))])
@@ -246,31 +246,31 @@ def test_a_gap_in_an_input_is_refused(tmp_path, row, cells):
     rows[row] = cells
     lacking = "value" if cells[0] else "time"
     (tmp_path / "a.csv").write_text("t [s],x [m],F [N]\n" + "".join(",".join(cells) + "\n" for cells in rows))
-    with pytest.raises(SceneError) as refused:
-        load_record(str(tmp_path / "a.csv"), ColumnOptions()).signals(DRIVEN)
-    assert f"a.csv: F, the input F, has no {lacking} in row {row + 2}: fill the gap" in str(refused.value)
+    with pytest.raises(SceneError) as refusal:
+        load_record(str(tmp_path / "a.csv"), ColumnOptions()).signals(DRIVEN_SOURCES)
+    assert f"a.csv: F, the input F, has no {lacking} in row {row + 2}: fill the gap" in str(refusal.value)
 
 
-@pytest.mark.parametrize("repeated", [[0], [1], [77], [0, 50], [3, 4], [10, 40, 95]])
-def test_a_repeated_time_is_dropped_and_named(tmp_path, repeated):
+@pytest.mark.parametrize("repeated_rows", [[0], [1], [77], [0, 50], [3, 4], [10, 40, 95]])
+def test_a_repeated_time_is_dropped_and_named(tmp_path, repeated_rows):
     """A logger that writes a sample twice does not sample slower: no other time may move."""
     t = 0.01 * np.arange(100)
-    rows = np.sort(np.append(np.arange(100), repeated))
+    rows = np.sort(np.append(np.arange(100), repeated_rows))
     signals = driven_table(tmp_path, t[rows], np.sin(t[rows]), np.cos(t[rows]))
     assert signals.t == pytest.approx(t, abs=1e-12)
     assert signals.input_t == pytest.approx(t, abs=1e-12)
     assert signals.inputs["F"] == pytest.approx(np.cos(t), abs=1e-8)
     (note,) = signals.notes
-    assert all(f"{t[i]:.6g} s" in note for i in repeated)
-    assert f"{len(repeated)} of {len(rows)} samples are left out" in note
+    assert all(f"{t[i]:.6g} s" in note for i in repeated_rows)
+    assert f"{len(repeated_rows)} of {len(rows)} samples are left out" in note
     record = read_record(tmp_path / "a.csv", column="x")
     assert record.t == pytest.approx(t, abs=1e-12)
     assert note in record.notes
 
 
-@pytest.mark.parametrize("lost", [[5], [50], [20, 70]])
-def test_a_missing_row_moves_no_other_sample(tmp_path, lost):
-    t = np.delete(0.01 * np.arange(100), lost)
+@pytest.mark.parametrize("lost_rows", [[5], [50], [20, 70]])
+def test_a_missing_row_moves_no_other_sample(tmp_path, lost_rows):
+    t = np.delete(0.01 * np.arange(100), lost_rows)
     (tmp_path / "a.csv").write_text("t [s],x [m]\n" + "".join(f"{time:.2f},{np.sin(time):.9g}\n" for time in t))
     record = read_record(tmp_path / "a.csv")
     assert record.t == pytest.approx(t, abs=1e-12)

@@ -17,7 +17,7 @@ from harness.records import size_limits
 LIMIT = 100_000  # bytes, for these tests
 
 
-def zipped(data):
+def deflate_members(data):
     """Return an archive with each member deflated."""
     file = io.BytesIO()
     with ZipFile(io.BytesIO(data)) as source, ZipFile(file, "w", ZIP_DEFLATED) as target:
@@ -40,10 +40,10 @@ def wide_sheet():
 
 BOMBS = {
     "record.csv.gz": lambda: gzip.compress(b"t [s],x [mm]\n" + b"0.1,0.2\n" * 20_000),
-    "record.npz": lambda: zipped(record_formats.npz(t=np.zeros(50_000), x=np.zeros(50_000))),
+    "record.npz": lambda: deflate_members(record_formats.npz(t=np.zeros(50_000), x=np.zeros(50_000))),
     "record.mat": compressed_mat,
-    "record.xlsx": lambda: zipped(wide_sheet()),
-    "phyphox.zip": lambda: zipped(record_formats.archive(Raw_Data="t [s],x [mm]\n" + "0.1,0.2\n" * 20_000)),
+    "record.xlsx": lambda: deflate_members(wide_sheet()),
+    "phyphox.zip": lambda: deflate_members(record_formats.archive(Raw_Data="t [s],x [mm]\n" + "0.1,0.2\n" * 20_000)),
 }
 
 
@@ -81,12 +81,12 @@ def test_a_compressed_data_set_has_a_limit(tmp_path, write):
 
 def swap_bytes(data):
     """Return a .mat file whose numbers outside compressed elements have the other order of bytes."""
-    swapped, position = bytearray(data), 128
-    swapped[124:128] = data[125:123:-1] + data[127:125:-1]  # version and mark of the order
+    swapped_data, position = bytearray(data), 128
+    swapped_data[124:128] = data[125:123:-1] + data[127:125:-1]  # version and mark of the order
     while position < len(data):
-        swapped[position : position + 8] = struct.pack(">II", *struct.unpack_from("<II", data, position))
+        swapped_data[position : position + 8] = struct.pack(">II", *struct.unpack_from("<II", data, position))
         position += 8 + struct.unpack_from("<I", data, position + 4)[0]
-    return bytes(swapped)
+    return bytes(swapped_data)
 
 
 @pytest.mark.parametrize("change", [bytes, swap_bytes])

@@ -30,8 +30,8 @@ def report(tmp_path):
             (folder / "summary.json").write_text(json.dumps({"version": 1} | content | {"picture": ""}))
             origin = {"command": "harness", "date": "2026-11-27", "files": {}, "parameters": {}, "scene": None}
             (folder / "provenance.json").write_text(json.dumps(origin | {"source": source}))
-        done = commands.harness(tmp_path, "report")
-        assert (done.returncode, done.stderr) == (0, "")
+        result = commands.harness(tmp_path, "report")
+        assert (result.returncode, result.stderr) == (0, "")
         return (tmp_path / "results/report.html").read_text(encoding="utf-8")
 
     return report
@@ -52,28 +52,28 @@ def judged_cases(*endings):
     return StabilityResult(rows, ()).summary(), ""
 
 
-def measured(*points, min_ratio=0.0, cases=("stickslip",)):
+def precision_summary(*points, min_ratio=0.0, cases=("stickslip",)):
     """Return the summary of a precision study."""
     return make_study(*points, cases=cases, min_ratio=min_ratio).summary()
 
 
 @pytest.mark.parametrize(
-    ("published", "outcome"),
+    ("published_value", "outcome"),
     [
         ('mean_step = [1.0, "s"]', None),
         ("f = 5.0", ("friction force, 3 cycles differs by -90 %", False)),
     ],
 )
-def test_steps_of_a_law_that_chatters_are_not_judged_but_its_loss_is(workspace, published, outcome):
+def test_steps_of_a_law_that_chatters_are_not_judged_but_its_loss_is(workspace, published_value, outcome):
     """A run time is not compared."""
     scene = (ROOT / "harness/scenes/coulomb-sign.toml").read_text().partition("[published]")[0]
     scene = re.sub("plots = .*", "plots = []\nstop = 2.2", scene).replace("repeat = 5", "repeat = 1")
-    known = f'[published]\nsource = "a method"\nrun_time = [1e-9, "s"]\n{published}\n'
+    known_values = f'[published]\nsource = "a method"\nrun_time = [1e-9, "s"]\n{published_value}\n'
     citation = '[citation]\nauthor = "A. Author"\ntitle = "A title"\nyear = 2020\nlocation = "table 1"\n'
-    (workspace / "mine.toml").write_text(f"{scene}{known}{citation}")
+    (workspace / "mine.toml").write_text(f"{scene}{known_values}{citation}")
     assert commands.harness(workspace, "run", "mine.toml").stderr == ""
-    found = json.loads((workspace / "results/mine/summary.json").read_text())["outcome"]
-    assert (found and (found["text"], found["is_good"])) == outcome
+    judgement = json.loads((workspace / "results/mine/summary.json").read_text())["outcome"]
+    assert (judgement and (judgement["text"], judgement["is_good"])) == outcome
 
 
 POINTS = [
@@ -99,13 +99,13 @@ CLOSE = [POINTS[1], make_point("rodas", 5e-3, 1e-8)]
     ],
 )
 def test_a_method_is_chosen_by_time_and_compared_with_the_runner_up(points, accuracy, is_quick, method, notes):
-    *_, table = measured(*points, min_ratio=QUICK.min_ratio if is_quick else 0.0).tables
+    *_, table = precision_summary(*points, min_ratio=QUICK.min_ratio if is_quick else 0.0).tables
     column = table.headings.index(f"error up to {accuracy:.0e}".replace("e-0", "e-"))
     assert table.rows[0][column].splitlines() == [method, *notes]
 
 
 def test_failed_runs_and_importers_are_not_compared_and_a_chattering_law_with_true_sticking():
-    summary = measured(
+    summary = precision_summary(
         make_point("ode23", 3e-3, 1e-7),
         make_point("ode23", 1e-3, 1e-7, FMPY),
         make_point("rodas", nan, nan, failure="too slow"),
@@ -135,10 +135,10 @@ def test_missed_benchmarks_are_shown_and_others_folded(report):
     ]
     page = report((summarize_benchmarks(benchmarks), ""))
     parts = re.split("<summary>(?:Targets that are met|Not measured)</summary>", page[page.index("1 of 2 targets") :])
-    missed, met, skipped = (re.findall(r"<td[^>]*>([^<]*)<", part) for part in parts)
-    assert missed == ["slow", "0.0035", "0.00125", "s", "a peer 1.6; another 2.5"]
-    assert met == ["fast", "0.0012", "0.00125", "s", "a peer 1.5"]
-    assert skipped == ["skipped", "", "", "", "not found: a tool"]
+    missed_cells, met_cells, skipped_cells = (re.findall(r"<td[^>]*>([^<]*)<", part) for part in parts)
+    assert missed_cells == ["slow", "0.0035", "0.00125", "s", "a peer 1.6; another 2.5"]
+    assert met_cells == ["fast", "0.0012", "0.00125", "s", "a peer 1.5"]
+    assert skipped_cells == ["skipped", "", "", "", "not found: a tool"]
 
 
 def test_code_and_powers_are_typeset(report):

@@ -55,8 +55,8 @@ class Tags(HTMLParser):
 
 def test_results_are_shown_under_the_title_and_nothing_else(report_run, page):
     """No missing results, verdicts, advice or other texts of the project."""
-    done = report_run[1]
-    assert (done.returncode, done.stdout, done.stderr) == (0, "Report in results/report.html\n", "")
+    result = report_run[1]
+    assert (result.returncode, result.stdout, result.stderr) == (0, "Report in results/report.html\n", "")
     headings = re.findall(r"<h[123]>(.*?)</h[123]>", page)
     runs = ["Runs", "coulomb", "coulomb-sign", "coulomb-stop"]
     assert headings == [
@@ -98,9 +98,9 @@ def test_every_heading_of_a_table_has_a_text_and_every_landmark_its_own_name(pag
 def test_the_contents_list_every_section_and_result(page):
     contents = re.search(r'<nav aria-label="Contents">.*?</nav>', page, re.S)[0]
     identifiers = {attributes.get("id", "") for tag, attributes in Tags(page).elements if tag in ("section", "div")}
-    linked = set(re.findall(r'href="#([^"]+)"', contents))
-    assert linked <= identifiers
-    assert {"run", "run-1", "run-3", "decay", "compare"} <= linked
+    targets = set(re.findall(r'href="#([^"]+)"', contents))
+    assert targets <= identifiers
+    assert {"run", "run-1", "run-3", "decay", "compare"} <= targets
 
 
 def test_every_link_leads_to_an_anchor_to_a_file_of_a_result_or_to_the_live_page(report_run, page):
@@ -114,11 +114,11 @@ def test_every_link_leads_to_an_anchor_to_a_file_of_a_result_or_to_the_live_page
 def test_text_from_results_is_escaped(report_run):
     """A name with markup is shown literally."""
     folder = report_run[0] / "results/decay/coulomb"
-    preserved = (folder / "summary.json").read_text()
-    (folder / "summary.json").write_text(preserved.replace('"title": "coulomb"', '"title": "<b>bold"'))
+    summary = (folder / "summary.json").read_text()
+    (folder / "summary.json").write_text(summary.replace('"title": "coulomb"', '"title": "<b>bold"'))
     assert harness(report_run[0], "report").returncode == 0
     assert "&lt;b&gt;bold" in (report_run[0] / "results/report.html").read_text()
-    (folder / "summary.json").write_text(preserved)
+    (folder / "summary.json").write_text(summary)
     assert harness(report_run[0], "report").returncode == 0
 
 
@@ -137,15 +137,15 @@ def test_a_report_that_cannot_be_written_leaves_no_file(tmp_path, report_run):
     results = tmp_path / "results"
     shutil.copytree(report_run[0] / "results/coulomb", results / "coulomb")
     (results / "report.html").mkdir()
-    done = harness(tmp_path, "report")
-    assert (done.returncode, done.stderr) == (1, "Error: cannot write results/report.html: Is a directory\n")
+    result = harness(tmp_path, "report")
+    assert (result.returncode, result.stderr) == (1, "Error: cannot write results/report.html: Is a directory\n")
     assert sorted(path.name for path in results.iterdir()) == ["coulomb", "report.html"]
 
 
 def test_without_results_there_is_no_report(tmp_path):
-    done = harness(tmp_path, "report")
-    assert done.returncode == 1
-    assert "no results in results" in done.stderr
+    result = harness(tmp_path, "report")
+    assert result.returncode == 1
+    assert "no results in results" in result.stderr
     assert list(tmp_path.iterdir()) == []
 
 
@@ -177,9 +177,9 @@ def test_the_navigation_stays_beside_the_text_on_a_wide_screen_only(report_run, 
 
 def test_published_values_are_shown_and_other_quantities_folded(page):
     part = re.search(r'<h3>coulomb-sign</h3>.*?<div class="figure"', page, re.S)[0]
-    compared, folded = part.split("<summary>Quantities without a known value</summary>")
-    assert [cell in compared for cell in ("friction force, 3 cycles", "smallest step")] == [True, False]
-    assert [cell in folded for cell in ("friction force, 3 cycles", "smallest step")] == [False, True]
+    shown_part, folded_part = part.split("<summary>Quantities without a known value</summary>")
+    assert [cell in shown_part for cell in ("friction force, 3 cycles", "smallest step")] == [True, False]
+    assert [cell in folded_part for cell in ("friction force, 3 cycles", "smallest step")] == [False, True]
 
 
 def test_texts_have_no_backticks(page):

@@ -97,10 +97,13 @@ def judged_cases():
     run = harness.simulate("smd", {"solver.rtol": 1e-6}, method="dop853", stop=0.1)
     spec = replace(run.spec, values={"solver.method": 4, "solver.rtol": 1e-6})
     grid = CommunicationGrid(0.0, 1.0, 10)
-    finishes = StabilityCase("stiff", "smd", "dop853", spec, grid, [], max_error=1e-6)
-    refused = StabilityCase("no mass", "smd", "dop853", spec, grid, [], expected_message="m = 0")
+    finished_case = StabilityCase("stiff", "smd", "dop853", spec, grid, [], max_error=1e-6)
+    refused_case = StabilityCase("no mass", "smd", "dop853", spec, grid, [], expected_message="m = 0")
     motion = replace(run, time=np.zeros(0), columns={}, spec=spec)
-    outcomes = CaseOutcome(finishes, "finished", "", 1e-8, 0.0, motion), CaseOutcome(refused, "refused", "m = 0 is not")
+    outcomes = (
+        CaseOutcome(finished_case, "finished", "", 1e-8, 0.0, motion),
+        CaseOutcome(refused_case, "refused", "m = 0 is not"),
+    )
     region = StabilityRegion("dop853", np.array([1e-2, 1e-3]), np.array([100.0, 900.0]), -0.95)
     return harness.StabilityResult(outcomes, (region,))
 
@@ -124,7 +127,7 @@ every_study = pytest.mark.parametrize("study", MAKERS)
 
 
 @cache
-def saved(study):
+def saved_folder(study):
     """Return the folder of a saved result, which all tests of this process share."""
     folder = Path(mkdtemp(dir=FOLDER.name)) / "kept"
     with commands.blank_figures():  # test_figures.py draws them
@@ -185,32 +188,40 @@ def test_a_result_is_plotted_whole_or_in_given_axes(study):
 @every_study
 def test_a_saved_result_loads_as_the_same_class_with_the_same_files(study):
     """Among them the texts of its figure."""
-    result, loaded = result_of(study), harness.load_result(saved(study))
-    assert type(loaded) is type(result)
-    assert (repr(loaded), str(loaded)) == (repr(result), str(result))
-    one, two = (json.loads(json.dumps(item.as_json(), default=str, sort_keys=True)) for item in (loaded, result))
+    result, loaded_result = result_of(study), harness.load_result(saved_folder(study))
+    assert type(loaded_result) is type(result)
+    assert (repr(loaded_result), str(loaded_result)) == (repr(result), str(result))
+    loaded_content, content = (
+        json.loads(json.dumps(item.as_json(), default=str, sort_keys=True)) for item in (loaded_result, result)
+    )
     if study == "sweep":
-        assert (one.pop("folder"), two.pop("folder")) == (str(saved(study)), None)
-    assert one == two
+        assert (loaded_content.pop("folder"), content.pop("folder")) == (str(saved_folder(study)), None)
+    assert loaded_content == content
     with commands.blank_figures():
-        loaded.save("again")
-    assert files_of(saved(study)) == files_of("again")
+        loaded_result.save("again")
+    assert files_of(saved_folder(study)) == files_of("again")
 
 
 @every_study
 def test_a_saved_result_holds_its_summary_and_origin(study):
-    stored, result = json.loads((saved(study) / "summary.json").read_text()), result_of(study)
+    stored_summary, result = json.loads((saved_folder(study) / "summary.json").read_text()), result_of(study)
     expected = result.summary()
-    assert (stored["study"], stored["title"], stored["sentences"]) == (study, "kept", [*expected.sentences])
-    assert [table["rows"] for table in stored["tables"]] == [[*map(list, table.rows)] for table in expected.tables]
-    assert stored["files"] == sorted(path.name for path in saved(study).glob("*.csv"))
-    assert f": harness.{result._function}" in stored["origin"][0]
+    assert (stored_summary["study"], stored_summary["title"], stored_summary["sentences"]) == (
+        study,
+        "kept",
+        [*expected.sentences],
+    )
+    assert [table["rows"] for table in stored_summary["tables"]] == [
+        [*map(list, table.rows)] for table in expected.tables
+    ]
+    assert stored_summary["files"] == sorted(path.name for path in saved_folder(study).glob("*.csv"))
+    assert f": harness.{result._function}" in stored_summary["origin"][0]
 
 
 @every_study
 def test_a_result_of_another_source_is_not_replaced(study):
     other = next(name for name in [*MAKERS][::-1] if name != study)
-    shutil.copytree(saved(study), "kept")
+    shutil.copytree(saved_folder(study), "kept")
     with pytest.raises(harness.HarnessError, match=r"kept holds"):
         result_of(other).save("kept")
     assert harness.load_result("kept").study == study
@@ -218,7 +229,7 @@ def test_a_result_of_another_source_is_not_replaced(study):
 
 @pytest.mark.parametrize("study", [study for study in MAKERS if study != "run"])  # which has its tables alone
 def test_damaged_data_are_reported(study):
-    shutil.copytree(saved(study), "kept")
+    shutil.copytree(saved_folder(study), "kept")
     data = Path("kept/data.npz")
     for content in (b"", data.read_bytes()[:-200], data.read_bytes().replace(b"content", b"another")):
         data.write_bytes(content)
@@ -271,7 +282,7 @@ def report_on(folder):
 def test_every_study_has_a_command_and_a_section_in_the_report(tmp_path):
     for study in STUDIES:
         assert commands.harness(tmp_path, study.command, "--help").returncode == 0
-        shutil.copytree(saved(study.name), tmp_path / "results" / study.name / "mine")
+        shutil.copytree(saved_folder(study.name), tmp_path / "results" / study.name / "mine")
     page = report_on(tmp_path / "results")
     titles = [page.index(f">{study.title}<") for study in STUDIES]
     assert titles == sorted(titles)
@@ -287,10 +298,10 @@ def test_a_result_without_anything_to_draw_has_no_empty_figure():
 
 
 def test_a_summary_of_an_unknown_study_is_at_the_end_of_the_report(tmp_path):
-    shutil.copytree(saved("decay"), tmp_path / "decay" / "mine")
+    shutil.copytree(saved_folder("decay"), tmp_path / "decay" / "mine")
     file = tmp_path / "decay" / "mine" / "summary.json"
     file.write_text(file.read_text().replace('"study": "decay"', '"study": "wavelets"'))
-    shutil.copytree(saved("stability"), tmp_path / "stability")
+    shutil.copytree(saved_folder("stability"), tmp_path / "stability")
     page = report_on(tmp_path)
     assert page.index(">Stability<") < page.index(">wavelets<")
     with pytest.raises(harness.SceneError, match="unknown study 'wavelets'"):
@@ -342,13 +353,13 @@ def test_a_method_uses_an_argument_or_refuses_it_in_one_sentence(maker, monkeypa
     methods = [getattr(value, name) for name in dir(type(value)) if name in OPERATORS or name[0] != "_"]
     for method in filter(inspect.ismethod, methods):
         parameters = inspect.signature(method).parameters if method.__name__ not in INTERNAL else {}
-        required = {name: VALID[name] for name in parameters if name in VALID}
+        required_arguments = {name: VALID[name] for name in parameters if name in VALID}
         for name, wrong in itertools.product(parameters, WRONG):
             try:
                 if name in ("name", "names"):
                     method(wrong)
                 else:
-                    method(**required | {name: wrong})
+                    method(**required_arguments | {name: wrong})
             except harness.HarnessError as error:
                 failures += [(method.__name__, name, wrong, error)] * ("\n" in str(error))
             except Exception as error:

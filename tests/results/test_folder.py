@@ -13,7 +13,7 @@ from harness import HarnessError
 from harness.results import folder as folders
 from harness.results.folder import replace_folder
 
-OURS = ("a.csv", "b.csv")
+FILE_NAMES = ("a.csv", "b.csv")
 
 
 def contents(folder):
@@ -30,7 +30,7 @@ def older(tmp_path):
 
 
 def test_a_new_result_replaces_the_previous_one(older):
-    with replace_folder(older, OURS) as fresh:
+    with replace_folder(older, FILE_NAMES) as fresh:
         (fresh / "b.csv").write_text("new")
         assert contents(older) == {"a.csv": "old"}
     assert contents(older) == {"b.csv": "new"}
@@ -40,7 +40,7 @@ def test_a_new_result_replaces_the_previous_one(older):
 @pytest.mark.parametrize("reason", [HarnessError("no"), KeyboardInterrupt()])
 def test_a_failure_half_way_keeps_the_previous_result_and_leaves_nothing_else(older, reason):
     def fail():
-        with replace_folder(older, OURS) as fresh:
+        with replace_folder(older, FILE_NAMES) as fresh:
             (fresh / "b.csv").write_text("half")
             raise reason
 
@@ -52,7 +52,7 @@ def test_a_failure_half_way_keeps_the_previous_result_and_leaves_nothing_else(ol
 
 def test_a_failure_leaves_no_folder_created_for_it(older):
     def fail():
-        with replace_folder(older.parent / "new/place/case", OURS):
+        with replace_folder(older.parent / "new/place/case", FILE_NAMES):
             raise HarnessError("no")
 
     with pytest.raises(HarnessError):
@@ -62,14 +62,14 @@ def test_a_failure_leaves_no_folder_created_for_it(older):
 
 def test_a_folder_with_other_files_is_not_replaced(older):
     (older / "notes.txt").write_text("mine")
-    with pytest.raises(HarnessError, match=r"holds notes\.txt"), replace_folder(older, OURS):
+    with pytest.raises(HarnessError, match=r"holds notes\.txt"), replace_folder(older, FILE_NAMES):
         pass
     assert contents(older) == {"a.csv": "old", "notes.txt": "mine"}
 
 
 def test_a_file_in_the_way_is_reported(tmp_path):
     (tmp_path / "results").write_text("a file")
-    with pytest.raises(HarnessError, match="cannot write below"), replace_folder(tmp_path / "results/case", OURS):
+    with pytest.raises(HarnessError, match="cannot write below"), replace_folder(tmp_path / "results/case", FILE_NAMES):
         pass
 
 
@@ -77,19 +77,19 @@ def test_a_file_in_the_way_is_reported(tmp_path):
 def steps(request, monkeypatch):
     """A system that exchanges two folders atomically, and one that does not."""
     if request.param == "two steps":
-        monkeypatch.setattr(folders, "exchange_folders", lambda one, two: False)
+        monkeypatch.setattr(folders, "exchange_folders", lambda first, second: False)
     return request.param
 
 
 def test_no_exchange_method_leaves_a_folder_behind(older, steps):
-    with replace_folder(older, OURS) as fresh:
+    with replace_folder(older, FILE_NAMES) as fresh:
         (fresh / "b.csv").write_text("new")
     assert contents(older) == {"b.csv": "new"}
     assert list(older.parent.iterdir()) == [older]
 
 
 def test_an_exchange_that_fails_half_way_keeps_the_previous_result(older, monkeypatch):
-    monkeypatch.setattr(folders, "exchange_folders", lambda one, two: False)
+    monkeypatch.setattr(folders, "exchange_folders", lambda first, second: False)
     rename = Path.rename
 
     def fail(self, target):
@@ -100,7 +100,7 @@ def test_an_exchange_that_fails_half_way_keeps_the_previous_result(older, monkey
     monkeypatch.setattr(Path, "rename", fail)
     with (
         pytest.raises(HarnessError, match=r"cannot write .*case: No space left on device"),
-        replace_folder(older, OURS),
+        replace_folder(older, FILE_NAMES),
     ):
         pass
     assert contents(older) == {"a.csv": "old"}
@@ -111,7 +111,7 @@ def test_an_exchange_that_fails_half_way_keeps_the_previous_result(older, monkey
 def test_the_umask_determines_the_permissions_of_a_result(tmp_path, mask):
     before = os.umask(mask)
     try:
-        with replace_folder(tmp_path / "results/case", OURS) as fresh:
+        with replace_folder(tmp_path / "results/case", FILE_NAMES) as fresh:
             (fresh / "a.csv").write_text("new")
     finally:
         os.umask(before)
@@ -120,7 +120,7 @@ def test_the_umask_determines_the_permissions_of_a_result(tmp_path, mask):
     assert (tmp_path / "results/case/a.csv").stat().st_mode & 0o777 == 0o666 & ~mask
 
 
-KILLED = """
+KILL_SCRIPT = """
 import os, sys
 from pathlib import Path
 from harness.results import folder as folders
@@ -136,7 +136,7 @@ def kill(event, arguments):
             os.kill(os.getpid(), 9)
 
 if steps == "two":
-    folders.exchange_folders = lambda one, two: False
+    folders.exchange_folders = lambda first, second: False
 with folders.replace_folder(place, ("a.csv", "b.csv")) as fresh:
     (fresh / "b.csv").write_text("new")
     sys.addaudithook(kill)
@@ -150,10 +150,10 @@ def test_a_kill_at_any_moment_keeps_the_previous_or_the_new_result(older, steps)
     outcomes, status, last = [], -9, 0
     while status:
         last += 1
-        status = subprocess.run([sys.executable, "-c", KILLED, older, steps, str(last)], cwd=ROOT).returncode
+        status = subprocess.run([sys.executable, "-c", KILL_SCRIPT, older, steps, str(last)], cwd=ROOT).returncode
         assert status in (0, -9)
         outcomes.append([*contents(older)] if older.exists() else [])
-        with pytest.raises(HarnessError, match="the next run"), replace_folder(older, OURS):
+        with pytest.raises(HarnessError, match="the next run"), replace_folder(older, FILE_NAMES):
             raise HarnessError("the next run, which fails")
         assert [*contents(older)] in (["a.csv"], ["b.csv"])
         assert list(older.parent.iterdir()) == [older]
@@ -173,9 +173,9 @@ def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
     for folder in (*leftovers, users_folder):
         folder.mkdir()
     (users_folder / "notes.txt").write_text("mine")
-    with replace_folder(older, OURS) as other:
+    with replace_folder(older, FILE_NAMES) as other:
         (other / "b.csv").write_text("of a run that goes on")
-        with replace_folder(older, OURS) as fresh:
+        with replace_folder(older, FILE_NAMES) as fresh:
             (fresh / "a.csv").write_text("of one that is quicker")
         assert contents(other) == {"b.csv": "of a run that goes on"}
         assert not leftovers[0].exists()
@@ -186,18 +186,18 @@ def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
 
 def test_a_new_folder_that_another_command_takes_for_a_leftover_is_created_again(older, monkeypatch):
     """The other command may remove it between its creation and its lock."""
-    create, created = folders.create_new_folder, []
+    create, new_folders = folders.create_new_folder, []
 
     def create_new_folder(folder):
-        created.append(create(folder))
-        if len(created) == 1:
-            created[0].rmdir()
-        return created[-1]
+        new_folders.append(create(folder))
+        if len(new_folders) == 1:
+            new_folders[0].rmdir()
+        return new_folders[-1]
 
     monkeypatch.setattr(folders, "create_new_folder", create_new_folder)
-    with replace_folder(older, OURS) as fresh:
+    with replace_folder(older, FILE_NAMES) as fresh:
         (fresh / "b.csv").write_text("new")
-    assert len(created) == 2
+    assert len(new_folders) == 2
     assert contents(older) == {"b.csv": "new"}
 
 
@@ -207,7 +207,7 @@ def test_a_file_system_without_locks_holds_results(older, monkeypatch):
         raise OSError(errno.ENOLCK, "No locks available")
 
     monkeypatch.setattr("fcntl.flock", refuse)
-    with replace_folder(older, OURS) as fresh:
+    with replace_folder(older, FILE_NAMES) as fresh:
         (fresh / "b.csv").write_text("new")
     assert contents(older) == {"b.csv": "new"}
 
@@ -217,7 +217,7 @@ def test_an_interrupt_in_another_working_directory_leaves_nothing(older, monkeyp
     monkeypatch.chdir(older.parent)
 
     def interrupt():
-        with replace_folder(Path("case"), OURS):
+        with replace_folder(Path("case"), FILE_NAMES):
             os.chdir("/")
             raise KeyboardInterrupt
 
@@ -230,7 +230,7 @@ def test_an_interrupt_in_another_working_directory_leaves_nothing(older, monkeyp
 def test_a_result_folder_that_is_a_link_is_refused_and_kept(tmp_path, target):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "case").symlink_to(tmp_path / target)
-    with pytest.raises(HarnessError, match="case is a link"), replace_folder(tmp_path / "case", OURS):
+    with pytest.raises(HarnessError, match="case is a link"), replace_folder(tmp_path / "case", FILE_NAMES):
         pass
     assert (tmp_path / "case").is_symlink()
     assert list((tmp_path / "elsewhere").iterdir()) == []
@@ -238,14 +238,17 @@ def test_a_result_folder_that_is_a_link_is_refused_and_kept(tmp_path, target):
 
 def test_a_result_folder_that_is_a_file_is_refused_and_kept(tmp_path):
     (tmp_path / "case").write_text("mine")
-    with pytest.raises(HarnessError, match="case holds a file of that name"), replace_folder(tmp_path / "case", OURS):
+    with (
+        pytest.raises(HarnessError, match="case holds a file of that name"),
+        replace_folder(tmp_path / "case", FILE_NAMES),
+    ):
         pass
     assert (tmp_path / "case").read_text() == "mine"
 
 
 def test_a_full_disk_is_reported_and_the_previous_result_kept(older):
     def fill():
-        with replace_folder(older, OURS) as fresh:
+        with replace_folder(older, FILE_NAMES) as fresh:
             (fresh / "b.csv").write_text("half")
             with open("/dev/full", "w") as full:
                 full.write("the rest")

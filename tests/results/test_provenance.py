@@ -26,7 +26,9 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "decay": (("decay", "coulomb", "--no-drag", "--end", "2"), "decay/coulomb"),
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
-DRAWN = "decay/coulomb"  # the others are not drawn; test_figures.py checks that the same drawing gives the same file
+DRAWN_RESULT = (
+    "decay/coulomb"  # the others are not drawn; test_figures.py checks that the same drawing gives the same file
+)
 harness = commands.harness
 
 
@@ -35,8 +37,8 @@ def example_run(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
     workspace, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
     (workspace / "fmus").symlink_to(fmus)
-    done = commands.harness(workspace, *arguments, figures=folder == DRAWN)
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.harness(workspace, *arguments, figures=folder == DRAWN_RESULT)
+    assert (result.returncode, result.stderr) == (0, "")
     return workspace, arguments, workspace / "results" / folder
 
 
@@ -64,14 +66,14 @@ def test_a_result_records_the_digests_of_its_files_and_all_versions(example_run)
 @pytest.mark.parametrize("model", MODELS)
 def test_every_effective_parameter_is_recorded_with_its_unit(workspace, model):
     assert harness(workspace, "run", f"fmus/{model}.fmu", "--set", "m=1.5", "--stop", "0.5").returncode == 0
-    recorded = read_provenance(workspace / "results" / model)["parameters"]
+    recorded_parameters = read_provenance(workspace / "results" / model)["parameters"]
     variables = read_model_description(str(workspace / f"fmus/{model}.fmu")).modelVariables
     parameters = [variable for variable in variables if variable.causality == "parameter"]
-    assert set(recorded) == {variable.name for variable in parameters}
+    assert set(recorded_parameters) == {variable.name for variable in parameters}
     for variable in parameters:
         type_unit = variable.declaredType.unit if variable.declaredType is not None else None
-        assert recorded[variable.name]["unit"] in (variable.unit, type_unit, "")
-    assert recorded["m"] == {"value": 1.5, "unit": "kg"}
+        assert recorded_parameters[variable.name]["unit"] in (variable.unit, type_unit, "")
+    assert recorded_parameters["m"] == {"value": 1.5, "unit": "kg"}
 
 
 def test_a_comparison_records_the_parameters_of_both_sides(workspace):
@@ -122,7 +124,7 @@ def files(folder):
     }
 
 
-MINE = 'title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = []\nstop = 1.0\ngrid = 0.1\n[values]\nc = 3.0\n'
+SCENE = 'title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = []\nstop = 1.0\ngrid = 0.1\n[values]\nc = 3.0\n'
 
 
 def write_decay(file):
@@ -153,22 +155,22 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
 def test_a_result_of_another_scene_is_not_replaced(workspace, fmus, first, second, folder):
     for subfolder in ("a", "b", "b/a"):
         (workspace / subfolder).mkdir()
-        (workspace / subfolder / "mine.toml").write_text(MINE)
+        (workspace / subfolder / "mine.toml").write_text(SCENE)
         shutil.copy(fmus / "smd.fmu", workspace / subfolder)
     write_decay(workspace / "a/coulomb.csv")
     assert harness(workspace, *first).returncode == 0
     before = files(workspace / "results" / folder)
-    done = harness(workspace, *second)
-    assert (done.returncode, done.stderr.count("\n"), done.stdout) == (1, 1, "")
-    assert f"results/{folder} holds the result of `python -m harness {' '.join(first)}`" in done.stderr
-    assert "choose another --out, or remove the folder" in done.stderr
+    result = harness(workspace, *second)
+    assert (result.returncode, result.stderr.count("\n"), result.stdout) == (1, 1, "")
+    assert f"results/{folder} holds the result of `python -m harness {' '.join(first)}`" in result.stderr
+    assert "choose another --out, or remove the folder" in result.stderr
     assert files(workspace / "results" / folder) == before
 
 
 def test_a_result_with_other_values_is_not_replaced_silently(workspace):
-    (workspace / "mine.toml").write_text(MINE)
+    (workspace / "mine.toml").write_text(SCENE)
     assert "place" not in harness(workspace, "run", "mine.toml").stdout
-    (workspace / "mine.toml").write_text(MINE.replace("3.0", "4.0").replace("1.0", "2.0"))
+    (workspace / "mine.toml").write_text(SCENE.replace("3.0", "4.0").replace("1.0", "2.0"))
     output = harness(workspace, "run", "mine.toml", COLUMNS="200").stdout
     assert re.search(r"It replaces the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", output)
 
@@ -188,9 +190,9 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
 def test_a_result_with_other_options_is_not_replaced_silently(workspace, arguments, older, newer, had):
     write_decay(workspace / "swing.csv")
     assert harness(workspace, *arguments, *older).returncode == 0
-    done = harness(workspace, *arguments, *newer, COLUMNS="200")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert re.search(rf"It replaces the result of [-\dT:+]+, which had {had}\b", done.stdout)
+    result = harness(workspace, *arguments, *newer, COLUMNS="200")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert re.search(rf"It replaces the result of [-\dT:+]+, which had {had}\b", result.stdout)
 
 
 def test_a_result_of_another_build_of_its_fmu_is_not_replaced_silently(workspace, fmus):
@@ -198,8 +200,8 @@ def test_a_result_of_another_build_of_its_fmu_is_not_replaced_silently(workspace
     assert harness(workspace, "run", "mine.fmu", "--stop", "0.5").returncode == 0
     with ZipFile(workspace / "mine.fmu", "a") as archive:
         archive.comment = b"built again"
-    done = harness(workspace, "run", "mine.fmu", "--stop", "0.5", COLUMNS="200")
-    assert re.search(r"It replaces the result of [-\dT:+]+, which had another mine\.fmu\.", done.stdout)
+    result = harness(workspace, "run", "mine.fmu", "--stop", "0.5", COLUMNS="200")
+    assert re.search(r"It replaces the result of [-\dT:+]+, which had another mine\.fmu\.", result.stdout)
 
 
 HOSTILE = (None, 0, float("inf"), True, "", 'unbalanced "', "\ud800", [], {}, {"a": 1}, {"a": {"b": []}})
@@ -214,7 +216,7 @@ def key_paths(table, path=()):
             yield from key_paths(value, (*path, name))
 
 
-def altered(provenance, path, value):
+def alter(provenance, path, value):
     """Return provenance as JSON with another value at a path."""
     table = part = json.loads(json.dumps(provenance))
     for name in path[:-1]:
@@ -227,8 +229,8 @@ def altered_files(provenance):
     """Yield provenance with each key of each table replaced by each hostile value, or by a deeply nested list."""
     for path in key_paths(provenance):
         if len(path) == 1 or path[:2] == ("parameters", "c") or path[-1] in ("values", "decay", "fmu", "outputs"):
-            yield from (altered(provenance, path, value) for value in HOSTILE)
-            yield altered(provenance, path, "deep").replace('"deep"', DEEP)
+            yield from (alter(provenance, path, value) for value in HOSTILE)
+            yield alter(provenance, path, "deep").replace('"deep"', DEEP)
 
 
 def read_source(text):
@@ -264,9 +266,9 @@ def test_a_new_result_never_depends_on_the_provenance_of_an_old_one(tmp_path, fi
 def test_a_folder_is_no_run(workspace, first_run):
     """Nothing that a provenance file names is run."""
     folder = shutil.copytree(first_run / "results/smd", workspace / "results/smd")
-    done = harness(workspace, "run", "results/smd")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "results/smd is a folder: give a model, a scene or an FMU" in done.stderr
+    result = harness(workspace, "run", "results/smd")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "results/smd is a folder: give a model, a scene or an FMU" in result.stderr
     with pytest.raises(HarnessError, match="is a folder"):
         simulate(folder)
 
@@ -274,10 +276,10 @@ def test_a_folder_is_no_run(workspace, first_run):
 def test_the_same_run_is_reproduced_bit_for_bit(example_run):
     workspace, arguments, folder = example_run
     before, provenance = files(folder), read_provenance(folder)
-    done = commands.harness(workspace, *arguments, figures=folder.match(DRAWN))
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.harness(workspace, *arguments, figures=folder.match(DRAWN_RESULT))
+    assert (result.returncode, result.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "run", "scene", "source"):
         assert read_provenance(folder)[key] == provenance[key]
     if arguments[0] == "run":
-        assert "the same, bit for bit" in done.stdout
+        assert "the same, bit for bit" in result.stdout

@@ -14,7 +14,7 @@ def text_with(**changes):
     return json.dumps({"version": 1, "study": "run", "title": "a title"} | changes)
 
 
-REFUSED = [  # the content of summary.json, and the reason
+REFUSED_CONTENTS = [  # the content of summary.json, and the reason
     (None, "is missing"),
     ("", "is not complete"),
     ('{"study": "run", "ti', "is not complete"),
@@ -43,17 +43,17 @@ def test_what_is_no_summary_is_shown_with_its_reason_and_the_command_to_run(tmp_
         "parameters": {},
         "scene": None,
     }
-    for i, (content, _) in enumerate([*REFUSED, (text_with(title="a good one"), "")]):
+    for i, (content, _) in enumerate([*REFUSED_CONTENTS, (text_with(title="a good one"), "")]):
         folder = tmp_path / f"results/{i}"
         folder.mkdir(parents=True)
         (folder / "provenance.json").write_text(json.dumps(origin))
         if content is not None:
             (folder / "summary.json").write_text(content)
-    done = commands.harness(tmp_path, "report")
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.harness(tmp_path, "report")
+    assert (result.returncode, result.stderr) == (0, "")
     page = unescape((tmp_path / "results/report.html").read_text(encoding="utf-8"))
     assert "<h3>a good one</h3>" in page
-    for i, (_, reason) in enumerate(REFUSED):
+    for i, (_, reason) in enumerate(REFUSED_CONTENTS):
         _, _, text = page.partition(f"<p>results/{i} cannot be shown: summary.json ")
         message, _, _ = text.partition("</p>")
         assert message.startswith(reason), i

@@ -605,7 +605,7 @@ def native_fmu(model, folder):
         return build_native_fmus() / "stickslip.fmu"
     file = folder / f"short_{model}.py"
     file.write_text({"belt": BELT, "stack": STACK}[model])
-    return build_user_model(file, *NATIVE, *METHODS, optimised=True) / "native" / f"short_{model}.fmu"
+    return build_user_model(file, *NATIVE, *METHODS, optimise=True) / "native" / f"short_{model}.fmu"
 
 
 @cache

@@ -33,12 +33,12 @@ def write_points(file, headings, backward, v=V):
 )
 def test_the_fmu_of_the_model_file_has_the_friction_of_the_best_law(tmp_path, headings, backward, speed, force):
     write_points(tmp_path / "bench.csv", headings, backward)
-    done = commands.harness(tmp_path, "curve", "bench.csv", "--velocity", headings[:1])
-    assert done.returncode == 0, done.stderr
+    result = commands.harness(tmp_path, "curve", "bench.csv", "--velocity", headings[:1])
+    assert result.returncode == 0, result.stderr
     curve = harness.load_result(tmp_path / "results" / "curve" / "bench")
     assert curve.best.law.is_symmetric == (backward is FORWARD)
-    built = commands.build("results/curve/bench/measured.py", folder=tmp_path)
-    assert built.returncode == 0, built.stderr
+    build_result = commands.build("results/curve/bench/measured.py", folder=tmp_path)
+    assert build_result.returncode == 0, build_result.stderr
     fmu = tmp_path / "results" / "curve" / "bench" / "measured.fmu"
     for v_driver in (0.2, -0.2):
         run = harness.simulate(fmu, {"k": 1e4, "v_driver": v_driver}, stop=1.0)
@@ -49,8 +49,8 @@ def test_the_fmu_of_the_model_file_has_the_friction_of_the_best_law(tmp_path, he
 
 def test_a_result_goes_on_to_models_and_tables(tmp_path):
     write_points(tmp_path / "bench.csv", "v [m/s],F [N]", FORWARD)
-    done = commands.harness(tmp_path, "curve", "bench.csv", "--mass", "2", "--json")
-    result = json.loads(done.stdout)
+    process = commands.harness(tmp_path, "curve", "bench.csv", "--mass", "2", "--json")
+    result = json.loads(process.stdout)
     values = {item["name"]: item["value"] for item in result["fit"]}
     assert values["F_s"] == pytest.approx(16.0, rel=0.02)
     belt, lugre, sled = (result["models"][name] for name in ("belt", "lugre", "stickslip"))
@@ -72,11 +72,11 @@ def test_a_result_goes_on_to_models_and_tables(tmp_path):
 def test_the_fmu_of_the_table_has_the_friction_of_the_points(tmp_path, backward):
     """It sticks and slips in both directions, and slides with the friction of the points, less their mean bias."""
     write_points(tmp_path / "bench.csv", "v [m/s],F [N]", backward)
-    done = commands.harness(tmp_path, "curve", "bench.csv")
-    assert done.returncode == 0, done.stderr
+    result = commands.harness(tmp_path, "curve", "bench.csv")
+    assert result.returncode == 0, result.stderr
     folder = tmp_path / "results" / "curve" / "bench"
-    built = commands.build("results/curve/bench/measured_table.py", folder=tmp_path)
-    assert built.returncode == 0, built.stderr
+    build_result = commands.build("results/curve/bench/measured_table.py", folder=tmp_path)
+    assert build_result.returncode == 0, build_result.stderr
     force = np.loadtxt(tmp_path / "bench.csv", delimiter=",", skiprows=1)[:, 1].reshape(2, -1)
     bias = harness.load_result(folder).best.bias
     forward, reverse = force[0] - bias, bias - force[1]
@@ -104,9 +104,9 @@ def test_the_fmu_of_the_table_has_the_friction_of_the_points(tmp_path, backward)
 )
 def test_options_that_do_not_fit_are_refused_in_a_sentence(tmp_path, options, message):
     write_points(tmp_path / "bench.csv", "v [m/s],F [N]", FORWARD)
-    done = commands.harness(tmp_path, "curve", "bench.csv", *options)
-    assert done.returncode == 2
-    assert message in done.stderr
+    result = commands.harness(tmp_path, "curve", "bench.csv", *options)
+    assert result.returncode == 2
+    assert message in result.stderr
     assert not (tmp_path / "results" / "curve" / "bench").exists()
 
 

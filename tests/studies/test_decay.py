@@ -14,9 +14,9 @@ from shared_keys import check_shared_keys
 @pytest.mark.parametrize("arguments", [("coulomb",), (ROOT / "docs/records/spring.csv", "--mass", "0.35")])
 def test_the_table_fits_into_80_columns_and_its_first_values_are_those_to_use(fmus, tmp_path, arguments):
     (tmp_path / "fmus").symlink_to(fmus)
-    done = commands.harness(tmp_path, "decay", *arguments, COLUMNS="80")
-    assert (done.returncode, done.stderr) == (0, "")
-    values, checks, *_ = done.stdout.split("\n\n")
+    result = commands.harness(tmp_path, "decay", *arguments, COLUMNS="80")
+    assert (result.returncode, result.stderr) == (0, "")
+    values, checks, *_ = result.stdout.split("\n\n")
     lines = [line for table in (values, checks) for line in table.splitlines()]
     assert max(map(len, lines)) <= 80
     assert not [line for line in lines if line.startswith(" ")]  # no cell is wrapped
@@ -51,15 +51,17 @@ def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples():
 def test_the_figure_of_a_long_record_shows_fewer_samples_and_the_extremes_of_each_turn():
     fit = identify(decay_record(0.01, t=np.linspace(0.0, 20.0, 20_001), noise=1e-3))
     signal, *_ = fit.plot()
-    times, shown = next(line.get_data() for line in signal.lines if line.get_label() == "record")
+    times, figure_x = next(line.get_data() for line in signal.lines if line.get_label() == "record")
     assert len(times) < 0.8 * len(fit.t)
     (omega,) = (estimate.value for estimate in fit.estimates if estimate.name == "omega")
     turn = 2 * np.pi / omega
     begins = np.arange(fit.t[0] + turn / 4, fit.t[-1] - turn, turn)
     assert len(begins) > 10
     for begin in begins:
-        whole, drawn = (x[(begin <= t) & (t < begin + turn)] for t, x in ((fit.t, fit.x), (times, shown)))
-        assert (drawn.min(), drawn.max()) == (whole.min(), whole.max())
+        record_part, figure_part = (
+            x[(begin <= t) & (t < begin + turn)] for t, x in ((fit.t, fit.x), (times, figure_x))
+        )
+        assert (figure_part.min(), figure_part.max()) == (record_part.min(), record_part.max())
 
 
 def harness(folder, *arguments, text=""):
@@ -70,19 +72,19 @@ def harness(folder, *arguments, text=""):
 def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_path):
     """The command line of fmpy simulates the FMU and writes the file."""
     words = ["simulate", fmus / "coulomb.fmu", "--output-file", "run.csv", "--output-interval", "0.005"]
-    done = commands.run_process(tmp_path, *words, "--start-values", "c", "0.3", "f", "0.4", module="fmpy")
-    assert (tmp_path / "run.csv").exists(), done.stderr
-    done = harness(tmp_path, "decay", "run.csv", "--unit", "m", "--k", "157.9", "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    estimates = {item["name"]: item["value"] for item in json.loads(done.stdout)["fit"]}
+    result = commands.run_process(tmp_path, *words, "--start-values", "c", "0.3", "f", "0.4", module="fmpy")
+    assert (tmp_path / "run.csv").exists(), result.stderr
+    result = harness(tmp_path, "decay", "run.csv", "--unit", "m", "--k", "157.9", "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+    estimates = {item["name"]: item["value"] for item in json.loads(result.stdout)["fit"]}
     assert estimates["f"] == pytest.approx(0.4, rel=1e-9)
     assert estimates["c"] == pytest.approx(0.3, rel=1e-9)
 
 
 def test_a_scene_writes_quantities_turning_points_fit_and_figure(workspace):
-    done = harness(workspace, "decay", "coulomb")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "Best described by dry friction" in done.stdout
+    result = harness(workspace, "decay", "coulomb")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "Best described by dry friction" in result.stdout
     folder = workspace / "results/decay/coulomb"
     files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json", "summary.json", "data.npz"}
     assert {file.name for file in folder.iterdir()} == files
@@ -95,9 +97,9 @@ def test_a_scene_writes_quantities_turning_points_fit_and_figure(workspace):
 def test_standard_input_is_accepted_as_a_record(tmp_path):
     record = decay_record(0.02, noise=1e-4)
     text = "t [s],x [m]\n" + "\n".join(f"{t:.9g},{x:.9g}" for t, x in zip(record.t, record.x, strict=True))
-    done = harness(tmp_path, "decay", "-", "--json", text=text)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)["record"] == "stdin"
+    result = harness(tmp_path, "decay", "-", "--json", text=text)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert json.loads(result.stdout)["record"] == "stdin"
 
 
 @pytest.mark.campaign
@@ -116,5 +118,5 @@ unnecessary += ("harness.simulation.runner", "harness.simulation.session")
 unnecessary += ("harness.scenes.run_spec", "harness.scenes.scene")
 print(len(draws), [name for name in unnecessary if name in sys.modules])
 """
-    done = commands.run_python(tmp_path, "-c", program)
-    assert (done.stdout.split(maxsplit=1), done.stderr) == (["1", "[]\n"], "")
+    result = commands.run_python(tmp_path, "-c", program)
+    assert (result.stdout.split(maxsplit=1), result.stderr) == (["1", "[]\n"], "")

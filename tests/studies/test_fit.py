@@ -111,32 +111,32 @@ def test_a_long_curved_valley_does_not_hide_the_best_values():
 
 
 def test_a_position_determines_the_ratio_of_stiffness_and_mass():
-    fit = harness.fit(native("stickslip"), pull(), ["k", "m"], observe="x", values={"mu_s": 0.8} | DRIVEN)
+    fit = harness.fit(native("stickslip"), pull(), ["k", "m"], observe="x", values={"mu_s": 0.8} | DRIVE_VALUES)
     assert {*fit.undetermined} == {"k", "m"}
     assert [combination.name for combination in fit.combinations] == ["k/m"]
     assert holds(fit["k/m"], 900.0 / 12.5)
     assert any("does not determine k, m" in remark for remark in fit.remarks)
 
 
-DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
+DRIVE_VALUES = {"mu_d": 0.5, "v_driver": 0.04}
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize(
-    ("displacement", "undetermined", "is_remarked"),
+    ("displacement", "undetermined_names", "is_remarked"),
     slow_after(
         1,
         [(0.0, {"mu_s", "mu_d", "v_driver"}, False), (1e-4, {"mu_s", "mu_d", "v_driver"}, False), (2e-4, set(), True)],
     ),
 )
-def test_values_that_the_last_samples_alone_exclude_are_remarked(displacement, undetermined, is_remarked):
+def test_values_that_the_last_samples_alone_exclude_are_remarked(displacement, undetermined_names, is_remarked):
     """The block slips once. Whether it begins to slip a second time decides about all values but k."""
     values, t = {"mu_s": 0.37, "mu_d": 0.14, "k": 400.0, "v_driver": 0.0157}, np.linspace(0.0, 15.9, 2000)
     record = pull(values=values, t=t, noise=0.004)
     record.loc[len(t) - 5 :, "x"] += displacement * np.arange(1, 6)
     fit = harness.fit(native("stickslip"), record, ["mu_s", "mu_d", "k", "v_driver"], observe=["x"])
     remarks = [remark for remark in fit.remarks if "a small part of the record" in remark]
-    assert {*fit.undetermined} == undetermined
+    assert {*fit.undetermined} == undetermined_names
     assert bool(remarks) == is_remarked
 
 
@@ -171,13 +171,13 @@ def search_of(monkeypatch):
     """Return search_of(argument, ...): the specification of the runs, the unknowns and the fixed values of a fit that
     would begin to search."""
 
-    def begin_search(simulator, records, unknowns, fixed, *options):
-        raise SearchBeganError(simulator.spec, {unknown.name: unknown for unknown in unknowns}, fixed)
+    def begin_search(simulator, records, unknowns, fixed_values, *options):
+        raise SearchBeganError(simulator.spec, {unknown.name: unknown for unknown in unknowns}, fixed_values)
 
     def search_of(*arguments, **options):
-        with pytest.raises(SearchBeganError) as began:
+        with pytest.raises(SearchBeganError) as error:
             harness.fit(*arguments, **options)
-        return began.value.args
+        return error.value.args
 
     monkeypatch.setattr("harness.studies.fit.study.fit_records", begin_search)
     monkeypatch.setattr("harness.studies.fit.study.native_equivalent", lambda fmu: fmu)
@@ -185,13 +185,13 @@ def search_of(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("free", "each", "started"),
+    ("free", "separate_names", "start_names"),
     [
         (("mu_s", "v_driver"), ("v_driver",), ("mu_s", "v_driver[1]", "v_driver[2]")),
         (("mu_s", "mu_d"), (), ("mu_s",)),
     ],
 )
-def test_a_fit_starts_from_an_earlier_one(tmp_path, search_of, free, each, started):
+def test_a_fit_starts_from_an_earlier_one(tmp_path, search_of, free, separate_names, start_names):
     """From its folder, its file or the result, from Python and in the command; an assignment takes precedence."""
     values = {"mu_s": 0.7, "v_driver[1]": 0.031, "v_driver[2]": 0.052}
     estimates = [{"name": name, "value": value} for name, value in values.items()]
@@ -201,16 +201,24 @@ def test_a_fit_starts_from_an_earlier_one(tmp_path, search_of, free, each, start
     def starts_of(unknowns):
         return {name: unknown.start for name, unknown in unknowns.items() if unknown.start is not None}
 
-    expected = {name: values[name] for name in started}
-    _, unknowns, _ = search_of("stickslip", frames, free, observe="x", each=each, start=tmp_path)
+    expected = {name: values[name] for name in start_names}
+    _, unknowns, _ = search_of("stickslip", frames, free, observe="x", each=separate_names, start=tmp_path)
     assert starts_of(unknowns) == expected
     for i, frame in enumerate(frames):
         frame.rename(columns={"t": "t [s]", "x": "x [m]"}).to_csv(f"{i}.csv", index=False)
-    words = ["fit", "stickslip", "0.csv", "1.csv", "--free", ",".join(free), *(f"--each={name}" for name in each)]
+    words = [
+        "fit",
+        "stickslip",
+        "0.csv",
+        "1.csv",
+        "--free",
+        ",".join(free),
+        *(f"--each={name}" for name in separate_names),
+    ]
     for paths in ([tmp_path], [tmp_path / "fit.json"], [tmp_path, "mu_s=0.6"]):
-        with pytest.raises(SearchBeganError) as began:
+        with pytest.raises(SearchBeganError) as error:
             commands.harness(tmp_path, *words, *(word for path in paths for word in ("--start", path)))
-        assert starts_of(began.value.args[1]) == (expected | {"mu_s": 0.6} if len(paths) > 1 else expected)
+        assert starts_of(error.value.args[1]) == (expected | {"mu_s": 0.6} if len(paths) > 1 else expected)
 
 
 def test_a_range_that_is_not_given_lies_around_the_start_value(search_of):
@@ -225,7 +233,7 @@ def test_a_sensor_with_offset_and_gain_is_identified():
     frame = pull()
     frame["x"] = 1.1 * frame["x"] + 0.02
     free = ["mu_s", "offset(x)", "gain(x)"]
-    fit = harness.fit(native("stickslip"), frame, free, observe="x", values=DRIVEN | {"k": 900.0})
+    fit = harness.fit(native("stickslip"), frame, free, observe="x", values=DRIVE_VALUES | {"k": 900.0})
     for name, truth in {"mu_s": 0.8, "offset(x)": 0.02, "gain(x)": 1.1}.items():
         assert holds(fit[name], truth)
 
@@ -243,7 +251,7 @@ EXACT = {  # record, and what is free, observed and fixed
 @pytest.mark.parametrize("name", EXACT)
 def test_exact_derivatives_find_what_differences_find_with_fewer_runs(monkeypatch, name):
     """Where every second derivative does not exist, differences replace it."""
-    model, values, free, fixed, options = EXACT[name]
+    model, values, free, fixed_values, options = EXACT[name]
     output = "theta" if model == "pendulum" else "x"
     if model == "stickslip":
         record = pull()
@@ -254,7 +262,7 @@ def test_exact_derivatives_find_what_differences_find_with_fewer_runs(monkeypatc
     exact_jacobian, count = FitProblem.exact_jacobian, itertools.count()
 
     def fit():
-        return harness.fit(native(model), record, free, observe=output, values=fixed, **options)
+        return harness.fit(native(model), record, free, observe=output, values=fixed_values, **options)
 
     def every_second(problem, *arguments):
         return None if next(count) % 2 else exact_jacobian(problem, *arguments)
@@ -266,9 +274,13 @@ def test_exact_derivatives_find_what_differences_find_with_fewer_runs(monkeypatc
     by_differences = fit()
     assert exact.n_runs < by_differences.n_runs
     for other in (half, by_differences):
-        for one, two in zip(exact.estimates, other.estimates, strict=True):
-            ends = [one.value - two.value, one.low - two.low, one.high - two.high]
-            assert np.abs(ends).max() <= 1e-3 * (two.high - two.low)
+        for exact_estimate, estimate in zip(exact.estimates, other.estimates, strict=True):
+            ends = [
+                exact_estimate.value - estimate.value,
+                exact_estimate.low - estimate.low,
+                exact_estimate.high - estimate.high,
+            ]
+            assert np.abs(ends).max() <= 1e-3 * (estimate.high - estimate.low)
     assert next(count) > 2  # derivatives were wanted
 
 
@@ -295,28 +307,34 @@ def shaker(t):
 
 
 def test_the_values_predict_a_record_that_was_not_fitted():
-    arguments = {"free": ["mu_s"], "observe": "x", "values": DRIVEN | {"k": 900.0}}
-    same, other = pull(seed=2, t=T[:150]), pull(values=TRUTH | {"mu_d": 0.7}, seed=3)
-    fit = harness.fit(native("stickslip"), pull(), validate=[same, other], **arguments)
+    arguments = {"free": ["mu_s"], "observe": "x", "values": DRIVE_VALUES | {"k": 900.0}}
+    similar_record, other_record = pull(seed=2, t=T[:150]), pull(values=TRUTH | {"mu_d": 0.7}, seed=3)
+    fit = harness.fit(native("stickslip"), pull(), validate=[similar_record, other_record], **arguments)
     good, bad = fit.validation.columns
     assert good.residual < 1.3 * good.noise
     assert bad.residual > 5.0 * bad.noise
     assert [len(record.t) for record in fit.validation.records] == [150, len(T)]
     (remark,) = (remark for remark in fit.remarks if "do not predict" in remark)
     assert "do not predict x in the validation record 2" in remark
-    rest = harness.fit(native("stickslip"), pull(), validate=same.assign(x=0.05), **arguments)
+    rest = harness.fit(native("stickslip"), pull(), validate=similar_record.assign(x=0.05), **arguments)
     (column,) = rest.validation.columns
     assert column.residual == pytest.approx(np.sqrt(np.mean((0.05 - rest.validation.predictions[0]) ** 2)))
     assert column.noise == fit.columns[0].noise  # a record at rest has none of its own
     spikes = np.where(np.arange(150) % 50 == 25, 20.0 * good.noise, 0.0)
-    spiked = harness.fit(
-        native("stickslip"), pull(), validate=same.assign(x=same["x"] + spikes), robust=True, **arguments
+    spiked_fit = harness.fit(
+        native("stickslip"),
+        pull(),
+        validate=similar_record.assign(x=similar_record["x"] + spikes),
+        robust=True,
+        **arguments,
     )
-    assert spiked.validation.columns[0].residual > 2.5 * spiked.validation.columns[0].noise
-    assert not any("do not predict" in remark for remark in spiked.remarks)
+    assert spiked_fit.validation.columns[0].residual > 2.5 * spiked_fit.validation.columns[0].noise
+    assert not any("do not predict" in remark for remark in spiked_fit.remarks)
     arguments |= {"free": {"mu_s": None, "x0": (-0.1, 0.1)}}
     with pytest.raises(SceneError, match="x0 has a value of its own for each record, and none for the validation"):
-        harness.fit(native("stickslip"), [same, same], validate=same, each=["x0"], **arguments)
+        harness.fit(
+            native("stickslip"), [similar_record, similar_record], validate=similar_record, each=["x0"], **arguments
+        )
 
 
 def test_a_validation_record_is_averaged_only_where_its_means_are_those_of_the_outputs():
@@ -361,7 +379,9 @@ def test_a_profile_crosses_its_limit_where_the_interval_ends():
 def test_outliers_count_little_in_a_robust_fit():
     frame = pull()
     frame.loc[::25, "x"] += 0.3
-    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", values=DRIVEN | {"k": 900.0}, robust=True)
+    fit = harness.fit(
+        native("stickslip"), frame, ["mu_s"], observe="x", values=DRIVE_VALUES | {"k": 900.0}, robust=True
+    )
     assert holds(fit["mu_s"], 0.8)  # without `robust`, the interval is four times as wide
     assert fit["mu_s"].high - fit["mu_s"].low < 0.004
 
@@ -369,7 +389,7 @@ def test_outliers_count_little_in_a_robust_fit():
 def test_a_record_of_another_motion_is_remarked():
     frame = pull()
     frame["x"] += 0.2 * np.sin(T)
-    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", values=DRIVEN | {"k": 900.0})
+    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", values=DRIVE_VALUES | {"k": 900.0})
     assert not fit.describes_record
     assert "do not rely on these values" in fit.remarks[0]
     assert not any(isfinite(estimate.error) for estimate in fit.estimates)
@@ -380,12 +400,12 @@ def test_the_command_writes_what_it_prints(tmp_path):
     frame = frame.assign(x=1e3 * frame["x"]).rename(columns={"t": "t [s]", "x": "laser [mm]"})
     frame.to_csv("pull.csv", index=False)
     words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s=0.3:1.5,k", "--set", "mu_d=0.5,v_driver=0.04")
-    done = commands.harness(tmp_path, *words, "--observe", "x=laser", "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    printed = json.loads(done.stdout)
+    result = commands.harness(tmp_path, *words, "--observe", "x=laser", "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+    output = json.loads(result.stdout)
     folder = tmp_path / "results" / "fit" / "pull"
-    stored = json.loads((folder / "fit.json").read_text())
-    assert stored == printed
+    content = json.loads((folder / "fit.json").read_text())
+    assert content == output
     assert {file.name for file in folder.iterdir()} == {
         "data.npz",
         "fit.json",
@@ -394,25 +414,25 @@ def test_the_command_writes_what_it_prints(tmp_path):
         "provenance.json",
         "summary.json",
     }
-    estimates = {estimate["name"]: estimate for estimate in stored["fit"]}
-    check_shared_keys(stored)
+    estimates = {estimate["name"]: estimate for estimate in content["fit"]}
+    check_shared_keys(content)
     assert estimates["k"]["low"] < 900.0 < estimates["k"]["high"]
     assert estimates["mu_s"]["low"] < 0.8 < estimates["mu_s"]["high"]
     harness.load_result(folder).save(tmp_path / "again")
-    assert json.loads((tmp_path / "again/fit.json").read_text()) == stored
+    assert json.loads((tmp_path / "again/fit.json").read_text()) == content
 
 
 @pytest.mark.parametrize(
-    ("fixed", "rtol", "method"),
+    ("fixed_values", "rtol", "method"),
     [
         ({}, 1e-8, "dop853"),
         ({"solver.rtol": 1e-5}, 1e-5, "dop853"),
         ({"solver.method": "ode45"}, 1e-8, "ode45"),
     ],
 )
-def test_runs_are_accurate_and_fast_unless_the_user_fixes_other_settings(search_of, fixed, rtol, method):
+def test_runs_are_accurate_and_fast_unless_the_user_fixes_other_settings(search_of, fixed_values, rtol, method):
     fmu, t = native("stribeck_sled"), np.linspace(0.0, 1.0, 50)
-    spec, _, values = search_of(fmu, {"t": t, "x": np.sin(t)}, {"k": (1.0, 2.0)}, observe="x", values=fixed)
+    spec, _, values = search_of(fmu, {"t": t, "x": np.sin(t)}, {"k": (1.0, 2.0)}, observe="x", values=fixed_values)
     assert harness.describe(fmu)["solver.method"].start == "ode45"
     assert values["solver.rtol"] == rtol
     labels = {int(item.value): item.name for item in read_method(fmu).declaredType.items}
@@ -433,7 +453,7 @@ def test_a_column_at_rest_with_coloured_noise_is_described(motion, is_described)
     white = np.random.default_rng(2).normal(size=len(frame) + 19)
     frame["x"] = 1e-4 * np.convolve(white, 0.8 ** np.arange(20), "valid") + motion * frame["t"]
     observe = ["x", "F_spring"]
-    fit = harness.fit(native("stickslip"), frame, {"k": (500.0, 2000.0)}, observe=observe, values=DRIVEN)
+    fit = harness.fit(native("stickslip"), frame, {"k": (500.0, 2000.0)}, observe=observe, values=DRIVE_VALUES)
     assert fit.describes_record == is_described
     assert not is_described or holds(fit["k"], TRUTH["k"])
 
@@ -442,7 +462,7 @@ def test_times_in_another_unit_are_named():
     frame = pull(t=np.linspace(0.0, 16.0, 400))
     frame["t"] *= 1e-3
     with pytest.raises(HarnessError, match=r"lasts 0\.016 s, about a thousandth of a run of the FMU \(16 s\)"):
-        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", values=DRIVEN)
+        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", values=DRIVE_VALUES)
 
 
 def test_a_record_without_such_a_motion_is_refused():
@@ -452,7 +472,7 @@ def test_a_record_without_such_a_motion_is_refused():
         harness.fit(native("stickslip"), frame, ["mu_s"], observe="x")
     frame["x"] = np.cos(7.0 * T)  # free oscillations
     with pytest.raises(HarnessError, match="no values describe the record better than a constant does"):
-        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", values=DRIVEN)
+        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", values=DRIVE_VALUES)
     frame["x"] = 1e-4 * np.random.default_rng(1).normal(size=len(T))
     with pytest.raises(HarnessError, match="shows no motion beyond its noise"):
         harness.fit(native("stickslip"), frame, {"mu_s": (2.0, 8.0)}, observe="x")
@@ -500,24 +520,26 @@ def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
 
 
 @pytest.fixture(scope="module")
-def compared():
+def compared_fits():
     """Fits of the law that made a record and of a wrong one, each of them first."""
     frame, fmus = pull(t=T[:81]), (native("stickslip"), native("stribeck_sled"))
     options = {"observe": "x", "values": {"k": 900.0, "v_driver": 0.04, "mu_d": 0.5}, "start": {"mu_s": 0.7}}
-    return [harness.fit(one, frame, ["mu_s", "f_s"], against=two, **options) for one, two in (fmus, fmus[::-1])]
+    return [
+        harness.fit(fmu, frame, ["mu_s", "f_s"], against=other_fmu, **options) for fmu, other_fmu in (fmus, fmus[::-1])
+    ]
 
 
 @pytest.mark.campaign
-def test_a_bic_is_that_of_white_residuals_of_a_linear_model(compared):
+def test_a_bic_is_that_of_white_residuals_of_a_linear_model(compared_fits):
     """For n residuals of variance s2 and k unknowns, BIC = n ln(s2) + k ln(n)."""
-    fit = compared[0]
+    fit = compared_fits[0]
     assert (fit.n_samples, len(fit.estimates)) == (81, 1)
     assert replace(fit, squares=162.0).bic == pytest.approx(81 * np.log(2.0) + np.log(81))
 
 
-def test_residuals_count_as_those_of_the_law_with_the_smallest(compared):
+def test_residuals_count_as_those_of_the_law_with_the_smallest(compared_fits):
     """Those of a wrong law are correlated because it is wrong; each law starts from the values that it has."""
-    for fit in compared:
+    for fit in compared_fits:
         right, wrong = sorted((fit, *fit.against), key=lambda law: law.squares)
         assert [law.fmu for law in fit.comparison.laws] == [right.fmu, wrong.fmu] == ["stickslip", "stribeck_sled"]
         assert wrong.n_independent < 0.5 * right.n_independent
@@ -533,12 +555,12 @@ def test_the_command_writes_the_compared_laws(tmp_path):
     frame.iloc[:60].to_csv("later.csv", index=False)
     words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s,f_s", "--set", "k=900,v_driver=0.04")
     words += ("--observe", "x=x", "--against", native("stribeck_sled"), "--validate", "later.csv")
-    done = commands.harness(tmp_path, *words, "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    printed = json.loads(done.stdout)
-    assert [law["fmu"] for law in printed["against"]] == ["stribeck_sled"]
-    assert {law["fmu"] for law in printed["comparison"]["laws"]} == {"stickslip", "stribeck_sled"}
-    assert [column["record"] for column in printed["validation"]] == ["later"]
+    result = commands.harness(tmp_path, *words, "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+    output = json.loads(result.stdout)
+    assert [law["fmu"] for law in output["against"]] == ["stribeck_sled"]
+    assert {law["fmu"] for law in output["comparison"]["laws"]} == {"stickslip", "stribeck_sled"}
+    assert [column["record"] for column in output["validation"]] == ["later"]
     for name, count in (("fit.csv", 81), ("validation.csv", 60)):
         lines = (tmp_path / "results" / "fit" / "pull" / name).read_text().splitlines()
         assert lines[0].split(",")[2:5] == ["x [m]", "x fit [m]", "x residual [m]"]
@@ -546,7 +568,7 @@ def test_the_command_writes_the_compared_laws(tmp_path):
         assert len(lines) == 1 + count
     table = commands.harness(tmp_path, *words).stdout
     assert "above the best" in table
-    assert printed["comparison"]["verdict"] in " ".join(table.split())
+    assert output["comparison"]["verdict"] in " ".join(table.split())
 
 
 @pytest.mark.campaign
@@ -557,7 +579,7 @@ def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
     def fail(*arguments):
         raise AttributeError("no such thing")
 
-    def know(t, x, free, known, force):
+    def know(t, x, free, known_values, force):
         record, _ = fit_peers.draw_even_record(fit_peers.KINDS[0], 0, build_native_fmus())
         return record.truth
 
@@ -627,17 +649,17 @@ def test_irregular_slips_are_described_one_by_one():
     frame = pytest.importorskip("pandas").DataFrame(
         {"t [s]": t, "F_spring [N]": record + 3e-4 * random.normal(size=len(t))}
     )
-    known, free = {"m": 0.03, "mu_d": 0.4, "v_driver": 1e-3, "k": 80.0}, {"mu_s": (0.5, 1.0)}
+    known_values, free = {"m": 0.03, "mu_d": 0.4, "v_driver": 1e-3, "k": 80.0}, {"mu_s": (0.5, 1.0)}
     with pytest.raises(HarnessError, match=r"no values describe .* slips of F_spring in the record are irregular"):
-        harness.fit(native("stickslip"), frame, free, observe="F_spring", values=known)
-    fit = harness.fit(native("stickslip"), frame, free, observe="F_spring", values=known, robust=True)
-    (found,) = fit.slips
+        harness.fit(native("stickslip"), frame, free, observe="F_spring", values=known_values)
+    fit = harness.fit(native("stickslip"), frame, free, observe="F_spring", values=known_values, robust=True)
+    (fitted_slips,) = fit.slips
     times, before = np.array(slips).T
-    assert found.t == pytest.approx(times, abs=0.051)
-    assert found.before == pytest.approx(before, abs=2e-3)
-    assert found.drop == pytest.approx(found.before - found.after)
-    assert f"The {len(found.t)} slips of F_spring in the record are irregular" in fit.remarks[0]
-    assert fit["slips"][0]["before"] == found.before.tolist()
+    assert fitted_slips.t == pytest.approx(times, abs=0.051)
+    assert fitted_slips.before == pytest.approx(before, abs=2e-3)
+    assert fitted_slips.drop == pytest.approx(fitted_slips.before - fitted_slips.after)
+    assert f"The {len(fitted_slips.t)} slips of F_spring in the record are irregular" in fit.remarks[0]
+    assert fit["slips"][0]["before"] == fitted_slips.before.tolist()
 
 
 def test_regular_slips_are_described_by_the_fit_alone():
@@ -646,7 +668,7 @@ def test_regular_slips_are_described_by_the_fit_alone():
         pull(("F_spring",), t=np.linspace(0.0, 30.0, 1000)),
         {"mu_s": (0.5, 1.0)},
         observe="F_spring",
-        values=DRIVEN | {"k": 900.0},
+        values=DRIVE_VALUES | {"k": 900.0},
     )
     assert fit.slips == ()
 

@@ -28,12 +28,12 @@ def frame(columns, units):
     return table
 
 
-def driven_record(lost=()):
-    """Return a record of coulomb, pushed by pulses with pauses at exactly 0; x lacks the samples `lost`."""
+def driven_record(missing_rows=()):
+    """Return a record of coulomb, pushed by pulses with pauses at exactly 0; x lacks the samples `missing_rows`."""
     force = np.where(T % 2 < 0.6, np.round(20 * np.sin(np.pi * (T % 2) / 0.6) ** 2, 3), 0.0)
     run = harness.simulate(native("coulomb"), times=T, inputs={"time": T, "F_ext": force})
     x = run["x"] + 1e-5 * np.random.default_rng(1).normal(size=len(T))
-    x[[*lost]] = np.nan
+    x[[*missing_rows]] = np.nan
     return frame({"t": T, "x": x, "force": force}, {"t": "s", "x": "m", "force": "N"})
 
 
@@ -42,7 +42,7 @@ def test_missing_samples_of_a_signal_take_none_of_the_input():
     """Half of a pulse lies where x is missing."""
     options = {"free": {"k": (50.0, 200.0), "f": (0.1, 2.0)}, "observe": "x", "inputs": {"F_ext": "force"}}
     complete = harness.fit(native("coulomb"), driven_record(), **options)
-    record = driven_record(lost=range(205, 225))
+    record = driven_record(missing_rows=range(205, 225))
     incomplete = harness.fit(native("coulomb"), record, **options)
     assert "20 of 401 rows have a missing cell" in " ".join(incomplete.notes)
     for result in (complete, incomplete):
@@ -101,9 +101,9 @@ def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sent
     assert fit.notes[0].startswith(sentence)
     record.columns = ["t [s]", *(f"{name} [{units[name]}]" for name in columns)]
     record.to_csv(tmp_path / "pull.csv", index=False)
-    done = commands.harness(tmp_path, "fit", native("smd"), "pull.csv", "--free", "k=50:400", "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)["notes"][0] == fit.notes[0].replace("`observe`", "--observe")
+    result = commands.harness(tmp_path, "fit", native("smd"), "pull.csv", "--free", "k=50:400", "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert json.loads(result.stdout)["notes"][0] == fit.notes[0].replace("`observe`", "--observe")
 
 
 @pytest.mark.campaign
@@ -112,12 +112,16 @@ def test_a_column_with_the_name_of_an_input_drives_the_runs():
     push = {"time": T, "F_ext": 3.0 * np.sin(11.0 * T)}
     run = harness.simulate(native("coulomb"), {"f": 0.2}, times=T, inputs=push)
     records = [{**push, "x": run["x"]}] * 2
-    chosen = harness.fit(native("coulomb"), records, ["f", "k"])
-    named = harness.fit(native("coulomb"), records, ["f", "k"], inputs=["F_ext"])
-    assert [estimate.value for estimate in chosen.estimates] == [estimate.value for estimate in named.estimates]
-    assert "the runs are driven by F_ext, because a column has its name; `inputs` selects others." in chosen.notes
-    lacking = harness.fit(native("coulomb"), [records[0], {"time": T, "x": run["x"]}], ["f", "k"])
-    assert not any("driven by" in note for note in lacking.notes)
+    automatic_fit = harness.fit(native("coulomb"), records, ["f", "k"])
+    explicit_fit = harness.fit(native("coulomb"), records, ["f", "k"], inputs=["F_ext"])
+    assert [estimate.value for estimate in automatic_fit.estimates] == [
+        estimate.value for estimate in explicit_fit.estimates
+    ]
+    assert (
+        "the runs are driven by F_ext, because a column has its name; `inputs` selects others." in automatic_fit.notes
+    )
+    incomplete_fit = harness.fit(native("coulomb"), [records[0], {"time": T, "x": run["x"]}], ["f", "k"])
+    assert not any("driven by" in note for note in incomplete_fit.notes)
 
 
 @pytest.mark.parametrize(
@@ -130,10 +134,10 @@ def test_a_column_with_the_name_of_an_input_drives_the_runs():
 )
 def test_a_choice_between_columns_is_left_to_the_user(model, units, words):
     record = frame({"t": T, **{name: np.sin(T) for name in units}}, {"t": "s"} | units)
-    with pytest.raises(SceneError) as refused:
+    with pytest.raises(SceneError) as refusal:
         harness.fit(native(model), record, {"k": (1.0, 2.0)})
     for text in ("nothing is observed", *words):
-        assert text in str(refused.value)
+        assert text in str(refusal.value)
 
 
 @pytest.mark.campaign

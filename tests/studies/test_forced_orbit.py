@@ -10,7 +10,7 @@ from variants import slow_after
 import harness
 from tests.studies.oscillators import build_text, native
 
-CLOCKED = '''
+CLOCK_MODEL = '''
 from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State, cos
 
 
@@ -42,7 +42,7 @@ class Clocked(Model):
     ],
 )
 def test_a_force_by_a_clock_has_the_amplitude_of_den_hartog(unit, rate, angle, options):
-    fmu = build_text("clocked", CLOCKED.replace("UNIT", repr(unit)).replace("RATE", rate).replace("ANGLE", angle))
+    fmu = build_text("clocked", CLOCK_MODEL.replace("UNIT", repr(unit)).replace("RATE", rate).replace("ANGLE", angle))
     (orbit,) = harness.orbit(fmu, **options).motions
     assert orbit.amplitude == pytest.approx(hartog(7.0), rel=1e-10)
     (twin,) = harness.orbit(native("forced"), {"Omega": 7.0}).motions
@@ -79,8 +79,8 @@ def test_an_orbit_with_a_triangular_force_is_the_end_of_a_long_run():
     run = harness.simulate(native("coulomb"), settings, inputs=long, times=long["time"][1:])
     assert orbit.n_sticks == 2
     np.testing.assert_allclose(orbit.y, [run["x"][-1], run["v"][-1]], rtol=1e-8)
-    stuck = harness.orbit(native("coulomb"), over={"f": [5.0, 6.5, 8.0]}, inputs=inputs, period=period)
-    assert [(item.n_sticks, item.stability) for item in stuck.motions] == [(2, "stable"), (2, "stable"), (2, "")]
+    result = harness.orbit(native("coulomb"), over={"f": [5.0, 6.5, 8.0]}, inputs=inputs, period=period)
+    assert [(item.n_sticks, item.stability) for item in result.motions] == [(2, "stable"), (2, "stable"), (2, "")]
     over = {"f": [3.0, 4.0, 5.0]}
     labels = harness.map_motions(native("coulomb"), over, inputs=inputs, period=period).labels
     assert labels[1] == "2 sticks in a period"

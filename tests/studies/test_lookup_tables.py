@@ -74,20 +74,20 @@ def test_values_of_a_table_are_fitted_by_name_or_by_their_scale(sled, tmp_path, 
     assert ("table guide" in panels) == (free != ["scale"])
     if free != ["scale"]:
         curves = [line for line in panels["table guide"].lines if len(line.get_xdata()) == len(X)]
-        start, fitted = curves[0].get_ydata(), curves[-1].get_ydata()
-        assert [*start] == [*VALUES.values()]
-        np.testing.assert_allclose(fitted, [*(VALUES | {name: fit[name].value for name in free}).values()])
+        start_values, fitted_values = curves[0].get_ydata(), curves[-1].get_ydata()
+        assert [*start_values] == [*VALUES.values()]
+        np.testing.assert_allclose(fitted_values, [*(VALUES | {name: fit[name].value for name in free}).values()])
 
 
 def test_points_are_listed_and_drawn_with_the_values_of_a_run(sled, tmp_path, monkeypatch):
-    done = commands.harness(tmp_path, "info", str(sled), "--json")
-    (table,) = json.loads(done.stdout)["tables"]
+    result = commands.harness(tmp_path, "info", str(sled), "--json")
+    (table,) = json.loads(result.stdout)["tables"]
     assert (table["name"], table["unit_x"], table["unit_y"]) == ("guide", "m/s", "N")
     assert (table["x"], table["y"]) == ([*X], [*VALUES.values()])
     assert table["parameters"] == [*VALUES]
-    listed = commands.harness(tmp_path, "info", str(sled)).stdout
-    assert "guide [N]" in listed
-    assert "8.5 (F_2)" in listed
+    text = commands.harness(tmp_path, "info", str(sled)).stdout
+    assert "guide [N]" in text
+    assert "8.5 (F_2)" in text
     panels = []
 
     def save(figure, *_, **__):
@@ -104,17 +104,17 @@ def test_points_are_listed_and_drawn_with_the_values_of_a_run(sled, tmp_path, mo
 @pytest.mark.campaign
 @pytest.mark.parametrize("sample", slow_after(1, [{}, {"samples": 30, "seed": 1}]), ids=["grid", "sample"])
 def test_a_sweep_of_values_of_a_table_shows_its_curves(sled, tmp_path, sample):
-    varied = {"F_0": [12.0, 13.0, 14.0], "F_2": [8.0, 8.5]} if not sample else {"F_0": (12.0, 14.0), "F_2": (8.0, 9.0)}
-    sweep = harness.sweep(sled, varied, values={"F_4": 12.0}, **sample)
+    grid = {"F_0": [12.0, 13.0, 14.0], "F_2": [8.0, 8.5]} if not sample else {"F_0": (12.0, 14.0), "F_2": (8.0, 9.0)}
+    sweep = harness.sweep(sled, grid, values={"F_4": 12.0}, **sample)
     sweep.save(tmp_path / "sweep")
     panels = draw(harness.load_result(tmp_path / "sweep"))
     title = "table guide: 20 of 30 curves" if sample else "table guide"
-    drawn = {tuple(line.get_ydata()) for line in panels[title].lines}
+    drawn_curves = {tuple(line.get_ydata()) for line in panels[title].lines}
     if sample:
-        runs = zip(*(sweep.data[name].to_numpy() for name in varied), strict=True)
+        runs = zip(*(sweep.data[name].to_numpy() for name in grid), strict=True)
     else:
-        runs = itertools.product(*varied.values())
+        runs = itertools.product(*grid.values())
     expected = {(f_0, VALUES["F_1"], f_2, VALUES["F_3"], 12.0) for f_0, f_2 in runs}
-    assert drawn <= expected
-    assert len(drawn) == (20 if sample else len(expected))
+    assert drawn_curves <= expected
+    assert len(drawn_curves) == (20 if sample else len(expected))
     assert not json.loads(harness.sweep(sled, {"m": [1.0, 2.0]}).data.attrs.get("tables", "[]"))

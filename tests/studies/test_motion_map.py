@@ -16,15 +16,15 @@ def test_the_map_of_the_belt_has_the_edges_of_closed_forms():
     """Also in worker processes; constant friction leaves steady sliding stable, and both motions possible."""
     over = {"c": [0.05, 0.1, 0.2], "v_belt": [0.1, 0.12, 1.5]}
     result = harness.map_motions(native("belt"), over, {"law": "coulomb"})
-    both, steady = "steady sliding or stick-slip", "steady sliding"
-    assert result.labels == (both,) * 6 + (steady,) * 3
-    assert {(edge.below, edge.above) for edge in result.edges} == {(both, steady)}
+    bistable_label, steady_label = "steady sliding or stick-slip", "steady sliding"
+    assert result.labels == (bistable_label,) * 6 + (steady_label,) * 3
+    assert {(edge.below, edge.above) for edge in result.edges} == {(bistable_label, steady_label)}
     for edge, c in zip(result.edges, over["c"], strict=True):
         assert edge.point == pytest.approx((c, edge_of_stick_slip(c)), rel=1e-11)
     *_, curve = result.plot()[0].lines  # which joins the edges
     assert {tuple(point) for point in curve.get_xydata()} == {edge.point for edge in result.edges}
-    shared = harness.map_motions(native("belt"), over, {"law": "coulomb"}, workers=2)
-    assert shared.edges == result.edges
+    parallel_result = harness.map_motions(native("belt"), over, {"law": "coulomb"}, workers=2)
+    assert parallel_result.edges == result.edges
 
 
 @pytest.mark.campaign
@@ -96,9 +96,9 @@ def test_points_at_which_runs_fail_are_a_region(in_workspace):
     assert result.edges[0].point[0] == pytest.approx(0.0, abs=1e-15)  # the smallest friction force
     assert "of these runs failed, such as f = -0.25: f = -0.25 N is refused" in " ".join(str(result).split())
     words = ("--over", "f=-0.25:0.5:4", "--measure", "events", "--workers", "1")
-    done = commands.harness(in_workspace, "map", "coulomb", *words)
-    assert done.returncode == 1
-    assert re.fullmatch(r"Error: \d+ of \d+ runs failed\n", done.stderr)
+    process = commands.harness(in_workspace, "map", "coulomb", *words)
+    assert process.returncode == 1
+    assert re.fullmatch(r"Error: \d+ of \d+ runs failed\n", process.stderr)
     with pytest.raises(harness.HarnessError, match=r"^all runs of the map failed, such as f = -2: f = -2\.0 N is ref"):
         harness.map_motions(native("coulomb"), {"f": [-2.0, -1.5, -1.0]}, measure="events", workers=1)
 
@@ -116,7 +116,7 @@ def test_the_map_of_a_forced_mass_counts_its_stops():
 def test_the_command_map_saves_what_the_function_returns(tmp_path):
     arguments = ("--over", "v_belt=0.4:6:3", "--over", "c=0.1:0.2:3", "--workers", "1", "--json")
     result = commands.harness(tmp_path, "map", native("belt"), *arguments)
-    loaded = harness.load_result(tmp_path / "results" / "map" / "belt-v_belt-c")
-    stable = [edge.point for edge in loaded.edges if edge.below == "stick-slip"]
+    loaded_result = harness.load_result(tmp_path / "results" / "map" / "belt-v_belt-c")
+    stable = [edge.point for edge in loaded_result.edges if edge.below == "stick-slip"]
     assert stable[0][0] == pytest.approx((sqrt(DELTA * STATIC / C) - 1) / DELTA, rel=1e-11)
     assert result.returncode == 0

@@ -22,8 +22,8 @@ STEADY, STICK_SLIP, SLIDING = "steady sliding", "stick-slip", "sliding orbit"
 
 def motion(result, kind):
     """Return the only motion of a kind."""
-    (found,) = [item for item in result.motions if item.kind == kind]
-    return found
+    (only_motion,) = [item for item in result.motions if item.kind == kind]
+    return only_motion
 
 
 @pytest.mark.parametrize("c", [0.05, 0.2])
@@ -182,11 +182,13 @@ def test_motions_do_not_depend_on_the_units_of_length_and_time(length, time):
     values |= {"v_belt": 1.7 * speed, "x0": 1.067 * length}
     result, expected = harness.orbit(native("belt"), values), harness.orbit(native("belt"), {"c": 0.1, "v_belt": 1.7})
     assert (result.remarks, len(expected.motions)) == (expected.remarks, 3)
-    for one, other in zip(result.motions, expected.motions, strict=True):
-        assert (one.kind, one.stability) == (other.kind, other.stability)
-        measured = one.period / time, one.largest / length, one.smallest / length
-        assert measured == pytest.approx((other.period, other.largest, other.smallest), rel=1e-12)
-        np.testing.assert_allclose(one.multipliers, other.multipliers, rtol=1e-9, atol=1e-9)
+    for scaled_motion, expected_motion in zip(result.motions, expected.motions, strict=True):
+        assert (scaled_motion.kind, scaled_motion.stability) == (expected_motion.kind, expected_motion.stability)
+        unscaled_values = scaled_motion.period / time, scaled_motion.largest / length, scaled_motion.smallest / length
+        assert unscaled_values == pytest.approx(
+            (expected_motion.period, expected_motion.largest, expected_motion.smallest), rel=1e-12
+        )
+        np.testing.assert_allclose(scaled_motion.multipliers, expected_motion.multipliers, rtol=1e-9, atol=1e-9)
 
 
 def test_limits_without_a_spring_or_a_fall_of_friction_are_no_errors():
@@ -345,10 +347,10 @@ def test_an_orbit_of_two_blocks_is_found_by_each_section_and_repeats_in_scipy(se
     assert orbit.period == pytest.approx(3.5388039025118, rel=1e-11)
     if section:
         np.testing.assert_allclose(follow_pair(orbit.y, 0.8, orbit.period), orbit.y, atol=1e-10)
-    marked = result.paths[-1][result.paths[-1][:, 3] > 0.0]
-    assert len(marked) == (2 if section is None else 1)
+    section_points = result.paths[-1][result.paths[-1][:, 3] > 0.0]
+    assert len(section_points) == (2 if section is None else 1)
     if section == "x1":
-        assert abs(marked[0, 1]) < 1e-12
+        assert abs(section_points[0, 1]) < 1e-12
 
 
 @pytest.mark.campaign
@@ -375,8 +377,8 @@ def test_of_a_python_fmu_its_native_twin_is_run(tmp_path):
     folder = build_user_model(commands.ROOT / "fmus" / "more" / "belt.py")
     file = shutil.copy(folder / "belt.fmu", tmp_path)
     values = {"c": 0.1, "v_belt": 2.0}
-    found, expected = (harness.orbit(source, values).motions for source in (file, native("belt")))
-    assert [(item.kind, item.period) for item in found] == [(item.kind, item.period) for item in expected]
+    motions, expected = (harness.orbit(source, values).motions for source in (file, native("belt")))
+    assert [(item.kind, item.period) for item in motions] == [(item.kind, item.period) for item in expected]
 
 
 @pytest.mark.parametrize(
@@ -409,8 +411,8 @@ def test_models_without_starts_or_oscillations_are_refused(name, message):
 
 def test_the_command_saves_what_the_function_returns(tmp_path):
     result = commands.harness(tmp_path, "orbit", native("belt"), "--set", "c=0.1", "--over", "v_belt=1:2:3", "--json")
-    loaded = harness.load_result(tmp_path / "results" / "orbit" / "belt-v_belt")
-    assert f'"value": {loaded.points[0].value!r}' in result.stdout
+    loaded_result = harness.load_result(tmp_path / "results" / "orbit" / "belt-v_belt")
+    assert f'"value": {loaded_result.points[0].value!r}' in result.stdout
     for span in ("2:1", "1:2:2", "1:2:x", "1"):
-        refused = commands.harness(tmp_path, "orbit", native("belt"), "--over", f"v_belt={span}")
-        assert (refused.returncode, "for 3 values or more, v_belt=0.1:3:60" in refused.stderr) == (2, True)
+        process = commands.harness(tmp_path, "orbit", native("belt"), "--over", f"v_belt={span}")
+        assert (process.returncode, "for 3 values or more, v_belt=0.1:3:60" in process.stderr) == (2, True)

@@ -99,9 +99,9 @@ def test_a_run_is_limited_in_steps_and_in_time(fmus):
         solve(peer_solvers.limit_evaluations(500))
     with pytest.raises(HarnessError, match=r"^at t = .* s after 0\.001 s of run time$"):
         solve(peer_solvers.limit_run_time(1e-3))
-    embedded = EmbeddedModel.create(load_model_class(fmus / "smd.fmu"), {}, None, 1e-9)
+    embedded_model = EmbeddedModel.create(load_model_class(fmus / "smd.fmu"), {}, None, 1e-9)
     with pytest.raises(HarnessError, match=r"^at t = .* s after 1e-06 s of run time$"):
-        embedded.solve(load_reference("smd").times.tolist(), timeout=1e-6)
+        embedded_model.solve(load_reference("smd").times.tolist(), timeout=1e-6)
 
 
 def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped(monkeypatch):
@@ -117,11 +117,11 @@ def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped(mon
             raise HarnessError("it took too long")
         return replace(load_reference("smd"), evaluations=7), 0.25
 
-    def broken(rtol, extent):
+    def fail(rtol, extent):
         raise HarnessError("it fell over")
 
     with pytest.raises(HarnessError, match="it fell over"):
-        list(sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, broken, must_succeed=True), QUICK))
+        list(sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, fail, must_succeed=True), QUICK))
     assert (
         list(sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, lambda rtol, extent: None), QUICK)) == []
     )
@@ -176,24 +176,24 @@ def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey():
         "scipy: RK45",
     ]
     for axes in panels:
-        labelled = {line.get_color() for line in axes.lines if not line.get_label().startswith("_")}
-        others = {line.get_color() for line in axes.lines if line.get_label().startswith("_")}
-        assert len(labelled) == 3
-        assert others == {"#cccccc"}
+        label_colours = {line.get_color() for line in axes.lines if not line.get_label().startswith("_")}
+        other_colours = {line.get_color() for line in axes.lines if line.get_label().startswith("_")}
+        assert len(label_colours) == 3
+        assert other_colours == {"#cccccc"}
     assert [len(axes.lines) for axes in panels] == [7, 6]  # fmpy evaluates as often as the FMU itself
 
 
 def test_no_advice_is_given_without_sufficient_evidence():
     """A quick run gives no advice if another solver comes close to the best method; a full run names a better peer."""
-    own, slower = make_point("rodas", 2e-3, 1e-7), make_point("ode23", 4e-3, 1e-7)
+    rodas_point, ode23_point = make_point("rodas", 2e-3, 1e-7), make_point("ode23", 4e-3, 1e-7)
     message = "stickslip: no recommendation from a quick run; use `friction-fmus precision stickslip`."
-    for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
-        points = own, slower, make_point("LSODA", peer, 1e-7, "scipy")
+    for peer, has_advice in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
+        points = rodas_point, ode23_point, make_point("LSODA", peer, 1e-7, "scipy")
         quick, complete = (make_study(*points, min_ratio=extent.min_ratio).advice for extent in (QUICK, FULL))
-        assert (quick == complete) == carried
-        assert carried or quick == message
+        assert (quick == complete) == has_advice
+        assert has_advice or quick == message
         assert complete.startswith("stickslip: use rodas: ")
-        assert ("scipy LSODA 0.85, not a method of the FMU" in complete) == (peer < own.seconds)
+        assert ("scipy LSODA 0.85, not a method of the FMU" in complete) == (peer < rodas_point.seconds)
     assert make_study(min_ratio=QUICK.min_ratio).advice == message
 
 
@@ -237,7 +237,7 @@ def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(
         pytest.param(path, ending, marks=pytest.mark.campaign if path.stem != "viscous_pendulum" else ())
         for path, ending in zip(EXAMPLE_MODELS, cycle((".py", ".fmu")))
     ],
-    ids=lambda one: Path(one).name,
+    ids=lambda path: Path(path).name,
 )
 def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     """Every check that needs only the equations of the file; the reference is where two of its methods agree."""

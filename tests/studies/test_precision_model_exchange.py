@@ -33,7 +33,7 @@ TOLERANCES = (1e-4, 1e-6, 1e-8)
 
 
 @pytest.fixture(scope="module")
-def both(fmus, tmp_path_factory):
+def versions_folder(fmus, tmp_path_factory):
     """A user's folder, with the FMUs for FMI 2.0 and 3.0."""
     folder = tmp_path_factory.mktemp("both")
     (folder / "fmus").mkdir()
@@ -45,17 +45,17 @@ def both(fmus, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def points(both):
+def points(versions_folder):
     """Return points(name, tool, tolerances): the results of the study for a case with a tool, without run times."""
 
     @cache
     def points(name, tool, tolerances=TOLERANCES):
-        file = both / "fmus" / f"{CASE[name].model}.fmu"
-        selected = [job for job in solver_jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
+        file = versions_folder / "fmus" / f"{CASE[name].model}.fmu"
+        jobs = [job for job in solver_jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
         with patch.object(study, "best_time", lambda run, budget: 0.0):
             return [
                 point
-                for job in selected
+                for job in jobs
                 for point in sweep_tolerances(CASE[name], job, SweepSettings(tolerances, 5.0, 0.0))
             ]
 
@@ -106,33 +106,39 @@ def test_a_step_limit_of_cvode_gives_a_gap_with_the_reason_of_fmpy(points, capfd
     assert capfd.readouterr() == ("", "")
 
 
-def test_each_run_of_an_instance_starts_from_scratch(both):
-    sled = RunSpec(both / "fmus/native/fmi3/stickslip.fmu", ("x", "v", "mode"), {"mu_s": 0.8}, stop=16.0, grid=0.5)
+def test_each_run_of_an_instance_starts_from_scratch(versions_folder):
+    sled = RunSpec(
+        versions_folder / "fmus/native/fmi3/stickslip.fmu", ("x", "v", "mode"), {"mu_s": 0.8}, stop=16.0, grid=0.5
+    )
     sled = replace(sled, follow=False, exchange=True)
-    first, repeated = (run_own_fmu(replace(sled, repeat=repeat)) for repeat in (1, 3))
-    other = run_own_fmu(replace(sled, values={}))
-    assert np.array_equal(first.time, repeated.time)
-    assert all(np.array_equal(first[name], repeated[name]) for name in sled.outputs)
-    assert first.statistics.evaluations == repeated.statistics.evaluations > 100
-    assert other["x"][-1] != first["x"][-1]
+    single_run, repeated_run = (run_own_fmu(replace(sled, repeat=repeat)) for repeat in (1, 3))
+    other_run = run_own_fmu(replace(sled, values={}))
+    assert np.array_equal(single_run.time, repeated_run.time)
+    assert all(np.array_equal(single_run[name], repeated_run[name]) for name in sled.outputs)
+    assert single_run.statistics.evaluations == repeated_run.statistics.evaluations > 100
+    assert other_run["x"][-1] != single_run["x"][-1]
 
 
 @pytest.mark.parametrize("exchange", [True, False])
-def test_a_failure_is_one_sentence(both, tmp_path, exchange, capfd):
-    def refused(file, values=None, timeout=60.0):
+def test_a_failure_is_one_sentence(versions_folder, tmp_path, exchange, capfd):
+    def failure_message(file, values=None, timeout=60.0):
         run = RunSpec(file, ("x",), values or {}, stop=16.0, grid=0.01, follow=False, exchange=exchange)
         with pytest.raises(HarnessError) as error:
             run_own_fmu(run, study.limit_run_time(timeout, 16.0))
         return str(error.value)
 
-    sled, missing, broken = both / "fmus/native/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"
-    broken.write_bytes(b"no archive")
-    assert refused(sled, {"m": -1.0}).startswith("m = -1.0 is outside its range")
-    assert refused(sled, {"mu_d": 2.0}).startswith("mu_d is 2.0, above mu_s = 0.9: ")
-    assert "'mess'" in refused(sled, {"mess": 1.0})
-    assert refused(sled, timeout=1e-6).endswith(" s after 1e-06 s of run time")
-    assert refused(missing).startswith(f"there is no {missing}: ")
-    assert refused(broken).startswith("broken.fmu cannot be read: File is not a zip file")
+    sled, missing_file, broken_file = (
+        versions_folder / "fmus/native/fmi3/stickslip.fmu",
+        tmp_path / "missing.fmu",
+        tmp_path / "broken.fmu",
+    )
+    broken_file.write_bytes(b"no archive")
+    assert failure_message(sled, {"m": -1.0}).startswith("m = -1.0 is outside its range")
+    assert failure_message(sled, {"mu_d": 2.0}).startswith("mu_d is 2.0, above mu_s = 0.9: ")
+    assert "'mess'" in failure_message(sled, {"mess": 1.0})
+    assert failure_message(sled, timeout=1e-6).endswith(" s after 1e-06 s of run time")
+    assert failure_message(missing_file).startswith(f"there is no {missing_file}: ")
+    assert failure_message(broken_file).startswith("broken.fmu cannot be read: File is not a zip file")
     assert capfd.readouterr() == ("", "")
 
 
@@ -142,7 +148,7 @@ def harness(folder, *arguments):
 
 
 @pytest.fixture(scope="module")
-def two_studies(both, fmus, tmp_path_factory):
+def two_studies(versions_folder, fmus, tmp_path_factory):
     """Two studies of smd with the report: with its FMI 3.0 FMU, and without it.
 
     The second one is of the model file, leaves out peers, and keeps results of another model. Returns the output of
@@ -150,10 +156,10 @@ def two_studies(both, fmus, tmp_path_factory):
     """
     (out, without), outputs, pages, files = map(tmp_path_factory.mktemp, ("out", "without")), [], [], {}
     (without / "fmus").symlink_to(fmus)
-    for folder, *words in ((both, "precision", "smd"), (without, "--json", "precision", "fmus/smd.fmu")):
-        done = harness(folder, *words, "--quick", "--out", out)  # --json before any command
-        assert (done.returncode, done.stderr) == (0, "")
-        outputs.append(done.stdout)
+    for folder, *words in ((versions_folder, "precision", "smd"), (without, "--json", "precision", "fmus/smd.fmu")):
+        result = harness(folder, *words, "--quick", "--out", out)  # --json before any command
+        assert (result.returncode, result.stderr) == (0, "")
+        outputs.append(result.stdout)
         files = files or {file.name: file.read_text() for file in (out / "precision/smd").glob("*.csv")}
         assert harness(folder, "report", "--out", out).returncode == 0
         pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
@@ -177,8 +183,8 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(two_studi
     heads, *table = csv.reader(files["model-exchange.csv"].splitlines())
     assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "smd [1]"]
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
-    printed = output.partition("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol")[2]
-    table_rows = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
+    error_table = output.partition("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol")[2]
+    table_rows = [line.split() for line in error_table.splitlines() if line.startswith("1e-")]
     assert table_rows == [[format_power(float(number)) if number else "-" for number in row] for row in table]
 
 
@@ -215,6 +221,8 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)
     assert float(inside[0]["largest [1]"]) < 1e-13
     numbers = ("method", "rtol [1]", "evaluations", "largest [1]")
-    same = [[[row[name] for name in numbers] for row in item if not row["failure"]] for item in (inside, outside)]
-    assert same[0] == same[1]
+    finished_rows = [
+        [[row[name] for name in numbers] for row in item if not row["failure"]] for item in (inside, outside)
+    ]
+    assert finished_rows[0] == finished_rows[1]
     assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows + later)

@@ -34,8 +34,8 @@ def draw(fmus, tmp_path_factory):
         scene = (ROOT / f"harness/scenes/{name}.toml").read_text()
         (folder / f"{name}.toml").write_text(re.sub("repeat = .*", "", scene))
         with patch.object(Figure, "savefig", lambda figure, *_, **__: figures.append(figure)):
-            done = commands.harness(folder, "run", f"{name}.toml", figures=True)
-        assert (done.returncode, done.stderr) == (0, "")
+            result = commands.harness(folder, "run", f"{name}.toml", figures=True)
+        assert (result.returncode, result.stderr) == (0, "")
         figures[0].draw_without_rendering()
         run = harness.load_result(folder / "results" / name)
         return run, {axes.get_title(loc="left"): axes for axes in figures[0].get_axes()}
@@ -76,9 +76,9 @@ def test_every_stick_phase_is_shaded_from_its_start(draw, name):
     run, panels = draw(name)
     sticks = [] if run.events is None else run.events.t[run.events.mode == 0]
     for title in curves(panels):
-        stuck = [patch.get_x() for patch in panels[title].patches if patch.get_label() == "stuck"]
-        assert stuck == pytest.approx(sticks[: len(stuck)])
-        assert len(sticks) - len(stuck) <= (name == "coulomb")  # whose last one begins after the end
+        shaded_starts = [patch.get_x() for patch in panels[title].patches if patch.get_label() == "stuck"]
+        assert shaded_starts == pytest.approx(sticks[: len(shaded_starts)])
+        assert len(sticks) - len(shaded_starts) <= (name == "coulomb")  # whose last one begins after the end
 
 
 @pytest.mark.parametrize("name", slow_after(2, SCENES))
@@ -99,8 +99,8 @@ def test_a_figure_explains_each_label_once(draw, name):
 def test_a_run_without_named_plots_has_no_panel_of_its_mode(fmus, tmp_path):
     figures = []
     with patch.object(Figure, "savefig", lambda figure, *_, **__: figures.append(figure)):
-        done = commands.harness(tmp_path, "run", str(fmus / "stickslip.fmu"), figures=True)
-    assert done.returncode == 0, done.stderr
+        result = commands.harness(tmp_path, "run", str(fmus / "stickslip.fmu"), figures=True)
+    assert result.returncode == 0, result.stderr
     labels = {axes.get_ylabel() for axes in figures[0].get_axes()}
     assert "F_friction [N]" in labels
     assert "mode" not in labels
@@ -129,11 +129,11 @@ def test_angles_are_in_degrees(draw):
 )
 def test_a_known_value_is_shown_with_its_kind(draw, name, title, figures):
     kind = "reference" if name == "stickslip" else "published"
-    known = [SCENES[name][kind][figure] for figure in figures]
+    known_values = [SCENES[name][kind][figure] for figure in figures]
     _, panels = draw(name)
     lines = [line.get_ydata() for line in panels[title].lines if line.get_label().startswith(kind)]
     levels = [y[0] for y in lines if len(set(y)) == 1]
-    assert levels == pytest.approx([value[0] if isinstance(value, list) else value for value in known])
+    assert levels == pytest.approx([value[0] if isinstance(value, list) else value for value in known_values])
 
 
 @pytest.mark.parametrize("name", ["smd", "stickslip-threshold", "pacejka-0.01"])
@@ -168,21 +168,21 @@ def blocks_run(tmp_path_factory):
     """The run of a model of two contacts, by itself, with its result folder."""
     folder = tmp_path_factory.mktemp("blocks")
     fmu = build_fmu(CONTACTS / "stacked.py")
-    done = commands.harness(folder, "run", str(fmu), figures=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout, folder / "results/stacked"
+    result = commands.harness(folder, "run", str(fmu), figures=True)
+    assert result.returncode == 0, result.stderr
+    return result.stdout, folder / "results/stacked"
 
 
 def test_several_contacts_are_named_in_the_events_and_in_the_figure(blocks_run):
     """The modes in the event list are those of the recorded modes; each contact has a row in each column."""
-    printed, folder = blocks_run
+    output, folder = blocks_run
     events = np.genfromtxt(folder / "events.csv", delimiter=",", names=True, deletechars="")
     assert events.dtype.names == ("t_[s]", "F_1", "F_2")
     columns = np.genfromtxt(folder / "trajectory.csv", delimiter=",", names=True, deletechars="")
     for contact, mode in (("F_1", "mode_1"), ("F_2", "mode_2")):
         after = np.searchsorted(columns["t_[s]"], events["t_[s]"], side="right") - 1
         assert (columns[mode][after] == events[contact]).mean() > 0.9  # an event may lie within rounding of its row
-        assert f"{contact}: {np.count_nonzero(np.diff(events[contact]))} change" in printed
+        assert f"{contact}: {np.count_nonzero(np.diff(events[contact]))} change" in output
     figure = (folder / "figure.svg").read_text(encoding="utf-8")
     for text in (
         "friction force of the ground on the lower block",
@@ -257,8 +257,8 @@ def test_an_output_takes_precedence_over_the_panel_of_its_name(tmp_path):
         (("named.toml",), {"another length", "phase angle", "a length of steps", "its rate"}),
         ((str(fmu),), {"another length", "phase angle", "a length of steps", "its rate", "a length"}),
     ):
-        done = commands.harness(tmp_path, "run", *words, figures=True)
-        assert done.returncode == 0, done.stderr
+        result = commands.harness(tmp_path, "run", *words, figures=True)
+        assert result.returncode == 0, result.stderr
         figure = (tmp_path / "results/named/figure.svg").read_text(encoding="utf-8")
         labels = {*re.findall(r">([^<>]+)</text>", figure)}
         assert titles <= labels

@@ -176,11 +176,13 @@ def test_conditions_and_parameters_that_are_fixed_have_derivatives(pair):
 def test_fmi_3_has_the_same_derivatives(name):
     by = {"pendulum": ["mu", "theta0"], "smd": ["c", "x0"], "coulomb": ["f", "x0"]}.get(name, ["mu_s", "k"])
     times = [0.5, 1.0, 5.0] if name != "coulomb" else [0.5, 1.0, 3.0]
-    one, two = (
+    fmi2_result, fmi3_result = (
         harness.sensitivity(folder / f"{name}.fmu", by, times=times)
         for folder in (build_native_fmus(), build_fmi3_fmus())
     )
-    np.testing.assert_allclose(one.left, two.left, rtol=1e-13, atol=1e-13 * np.abs(one.left).max())
+    np.testing.assert_allclose(
+        fmi2_result.left, fmi3_result.left, rtol=1e-13, atol=1e-13 * np.abs(fmi2_result.left).max()
+    )
 
 
 def test_the_factor_of_an_input_is_a_parameter():
@@ -282,12 +284,12 @@ def test_derivatives_of_random_models_are_those_of_differences(seed, tmp_path):
     outputs = list(s.outputs)
     largest = np.abs(s.values).max(axis=0)
     for i, (parameter, value) in enumerate(s.parameters.items()):
-        found = [differences(fmu, parameter, value, values, times, outputs, h) for h in (1e-3, 1e-4, 1e-5)]
+        quotients = [differences(fmu, parameter, value, values, times, outputs, h) for h in (1e-3, 1e-4, 1e-5)]
         sizes = 1e-2 * largest / abs(value), 1e-6 * largest.max() / abs(value)  # the second one for outputs at rest
-        size = np.max([np.abs(found[1]).max(axis=0), np.maximum(*sizes)], axis=0)
-        error = np.min([np.abs(s.left[:, i] - one) / size for one in found], axis=0)
-        allowed = 1e-8 + 3 * np.min([np.abs(a - b) / size for a, b in pairwise(found)], axis=0)
-        assert not np.any(error > allowed), (parameter, error.max())  # NaN: there is no derivative
+        size = np.max([np.abs(quotients[1]).max(axis=0), np.maximum(*sizes)], axis=0)
+        error = np.min([np.abs(s.left[:, i] - quotient) / size for quotient in quotients], axis=0)
+        bound = 1e-8 + 3 * np.min([np.abs(a - b) / size for a, b in pairwise(quotients)], axis=0)
+        assert not np.any(error > bound), (parameter, error.max())  # NaN: there is no derivative
 
 
 @pytest.mark.parametrize(

@@ -36,14 +36,14 @@ QUICK = (
 
 def is_sampled():
     """Return a predicate for scenes in QUICK or at the soft end of the region: the first with each model and value."""
-    seen = set()
+    seen_marks = set()
 
     def is_new(scene):
         if not (scene["pattern"] in QUICK or ("region" in scene and scene["varied"] in (0.1, 0.03))):
             return False
         marks = {(scene["pattern"], key, repr(scene.get(key))) for key in ("model", "varied")}
-        has_new_mark = not marks <= seen
-        seen.update(marks)
+        has_new_mark = not marks <= seen_marks
+        seen_marks.update(marks)
         return has_new_mark
 
     return is_new
@@ -68,10 +68,10 @@ LINEAR = {
 
 @pytest.mark.parametrize("case", LINEAR.values(), ids=LINEAR)
 def test_the_closed_form_agrees_with_the_independent_one(case):
-    name, chosen = case
-    values, stop = {**defaults(name), **chosen}, 16.0 if name == "stickslip" else 4.0
+    name, settings = case
+    values, stop = {**defaults(name), **settings}, 16.0 if name == "stickslip" else 4.0
     solution = compute_reference(name, [(0.0, stop, values)], CommunicationGrid(0.0, stop, 60))
-    traits = {k: v for k, v in chosen.items() if k not in ("x0", "v0")}
+    traits = {k: v for k, v in settings.items() if k not in ("x0", "v0")}
     motion = independent_solution.ClosedFormMotion(
         [(0.0, getattr(independent_solution, name)(**traits))], values["x0"], values["v0"], stop
     )
@@ -161,12 +161,12 @@ def test_a_correct_motion_is_finished(case, counts):
 
 
 def test_events_that_rounding_decides_are_not_judged(case, counts):
-    undecided = SimpleNamespace(**{**vars(REST), "events": None})
-    assert judge(case, counts, reference=undecided, events=2).ended == FINISHED
+    reference = SimpleNamespace(**{**vars(REST), "events": None})
+    assert judge(case, counts, reference=reference, events=2).ended == FINISHED
 
 
 @pytest.mark.parametrize(
-    ("changed", "message"),
+    ("changes", "message"),
     [
         ({"columns": {"x": np.array([1.0, 1.0, 1.01])}}, "error 0.01"),
         ({"columns": {"v": np.array([0.0, nan, 0.0])}}, "error nan"),
@@ -176,8 +176,8 @@ def test_events_that_rounding_decides_are_not_judged(case, counts):
     ],
     ids=["far", "not a number", "energy out of nothing", "late", "one event too many"],
 )
-def test_a_plausible_wrong_motion_is_wrong(case, counts, changed, message):
-    row = judge(case, counts, **changed)
+def test_a_plausible_wrong_motion_is_wrong(case, counts, changes, message):
+    row = judge(case, counts, **changes)
     assert row.ended == WRONG
     assert not row.has_passed
     assert message in row.text
@@ -298,12 +298,12 @@ class Relax(Model):
 def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_precision(tmp_path):
     (tmp_path / "relax.py").write_text(RELAX)
     assert commands.build("relax.py", folder=tmp_path).returncode == 0
-    done = commands.harness(tmp_path, "stability", "relax.py")
-    assert (done.returncode, done.stdout) == (1, "")
+    result = commands.harness(tmp_path, "stability", "relax.py")
+    assert (result.returncode, result.stdout) == (1, "")
     output = "no state is the rate of another one; the cases need a position and a speed"
-    assert done.stderr == f"Error: relax.py: {output}\n"
-    done = commands.harness(tmp_path, "precision", "relax.py", "--quick")
-    assert (done.returncode, done.stderr) == (0, "")
+    assert result.stderr == f"Error: relax.py: {output}\n"
+    result = commands.harness(tmp_path, "precision", "relax.py", "--quick")
+    assert (result.returncode, result.stderr) == (0, "")
     assert (tmp_path / "results/precision/relax/points.csv").is_file()
 
 
@@ -329,8 +329,8 @@ def test_a_hang_is_the_outcome_of_its_case(case, monkeypatch):
 def test_a_motion_that_differs_from_two_agreeing_methods_is_wrong():
     file = str(build_user_model(EXAMPLE_MODELS[0]) / f"{EXAMPLE_MODELS[0].stem}.fmu")
     group = next(group for group in grouped_cases(models=[file]) if group[0].title == "as it comes")
-    one = replace(group[0], max_error=1e-300)
+    tight_case = replace(group[0], max_error=1e-300)
     with study.Worker() as worker:
-        (row,) = study.run_group([one], worker)
+        (row,) = study.run_group([tight_case], worker)
     assert (row.has_passed, row.ended) == (False, WRONG)
     assert "more than 1e-300" in row.text

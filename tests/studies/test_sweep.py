@@ -47,8 +47,8 @@ def sweep(fmus, monkeypatch):
 
 def test_a_sample_has_a_run_in_every_stratum(command, sweep, tmp_path):
     ranges = ("--vary", "m=1:2", "--vary", "k=1:100:log", "--samples", 20, "--seed", 1, "--stop", 0.01)
-    done = command("sweep", "smd", *ranges, "--workers", 1, "--name", "sample")
-    assert done.returncode == 0
+    result = command("sweep", "smd", *ranges, "--workers", 1, "--name", "sample")
+    assert result.returncode == 0
     data = open_sweep(tmp_path / "results/sweep/sample")
     assert (data.sizes, {*data.coords}, data["k"].dims) == ({"run": 20}, {"m", "k"}, ("run",))
     m, k = data["m"].to_numpy(), data["k"].to_numpy()
@@ -64,9 +64,9 @@ def test_a_sample_has_a_run_in_every_stratum(command, sweep, tmp_path):
     ],
 )
 def test_an_invalid_axis_is_refused(command, text, options):
-    done = command("sweep", "smd", "--vary", text, *options)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert f"--vary {text}" in done.stderr
+    result = command("sweep", "smd", "--vary", text, *options)
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert f"--vary {text}" in result.stderr
 
 
 @pytest.mark.parametrize("n_axes", [2, 4])
@@ -88,23 +88,23 @@ def test_a_reset_instance_gives_the_same_results_as_a_fresh_one(sweep):
     assert alone.equals(together.sel(mu_d=[0.6]))
     omega, x_d = sqrt(742.5 / 12.5), 0.3 * 12.5 * 9.81 / 742.5
     peak = 0.034 + omega * sqrt(x_d**2 + (0.034 / omega) ** 2)
-    measured = [alone[name].item() for name in ("events", "slips", "period", "peak_speed", "stuck")]
-    assert measured == pytest.approx([8, 4, 3.34510449933, peak, 16 - 4 * 0.430665996656], rel=1e-4)
+    values = [alone[name].item() for name in ("events", "slips", "period", "peak_speed", "stuck")]
+    assert values == pytest.approx([8, 4, 3.34510449933, peak, 16 - 4 * 0.430665996656], rel=1e-4)
 
 
 def test_decay_measures_match_the_parameters(sweep):
     friction = sweep("coulomb", {"f": [2.0]}, measures=("rest", "f_over_k"))
     assert friction["f_over_k"].item() == pytest.approx(2 / 157.9, rel=1e-3)
     assert abs(friction["rest"].item()) <= 2 / 157.9
-    damped = sweep("smd", {"c": [1.0]}, measures=("zeta",))
-    assert damped["zeta"].item() == pytest.approx(1 / (2 * sqrt(157.9)), rel=1e-5)
+    damping = sweep("smd", {"c": [1.0]}, measures=("zeta",))
+    assert damping["zeta"].item() == pytest.approx(1 / (2 * sqrt(157.9)), rel=1e-5)
 
 
 def test_a_sled_pulled_backward_has_the_measures_of_one_pulled_forward(sweep):
     """A law without modes, whose sled never stops; the period is that of its reference."""
     measures = ("slips", "period", "unsteady", "peak_speed")
-    both = sweep("pacejka", {"v_driver": [0.034, -0.034]}, values={"x_m": 0.01}, measures=measures, rtol=1e-6)
-    forward, backward = ([float(both[name].sel(v_driver=v)) for name in measures] for v in (0.034, -0.034))
+    data = sweep("pacejka", {"v_driver": [0.034, -0.034]}, values={"x_m": 0.01}, measures=measures, rtol=1e-6)
+    forward, backward = ([float(data[name].sel(v_driver=v)) for name in measures] for v in (0.034, -0.034))
     assert forward == pytest.approx(backward, rel=1e-6, nan_ok=True)
     assert forward[0] == 3
     assert forward[1] == pytest.approx(3.7169, abs=1e-3)
@@ -113,13 +113,15 @@ def test_a_sled_pulled_backward_has_the_measures_of_one_pulled_forward(sweep):
 @pytest.mark.campaign
 def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(command, tmp_path):
     for workers in (1, 2):
-        done = command(*MAP, "--workers", workers, "--out", f"out{workers}")
-        assert (done.returncode, done.stderr) == (0, "")
-        assert "12 runs, 0 of them resumed, 0 failed" in done.stdout
-    one, two = (sweep_folder(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 2))
+        result = command(*MAP, "--workers", workers, "--out", f"out{workers}")
+        assert (result.returncode, result.stderr) == (0, "")
+        assert "12 runs, 0 of them resumed, 0 failed" in result.stdout
+    first_folder, second_folder = (
+        sweep_folder(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 2)
+    )
     for file in ("sweep.nc", "sweep.csv"):
-        assert (one / file).read_bytes() == (two / file).read_bytes()
-    assert {file.name for file in two.iterdir()} == {
+        assert (first_folder / file).read_bytes() == (second_folder / file).read_bytes()
+    assert {file.name for file in second_folder.iterdir()} == {
         "sweep.nc",
         "sweep.csv",
         "data.npz",
@@ -127,13 +129,13 @@ def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(comma
         "provenance.json",
         "summary.json",
     }
-    assert [file.name for file in one.parent.iterdir()] == [one.name]
-    data = open_sweep(one)
+    assert [file.name for file in first_folder.parent.iterdir()] == [first_folder.name]
+    data = open_sweep(first_folder)
     assert data["slips"].dims == ("mu_d", "v_driver")
     assert data["v_driver"].attrs["units"] == data["final_v"].attrs["units"] == "m/s"
     assert len(data.attrs["fmu_sha256"]) == 64
     assert json.loads(data.attrs["parameters"])["m"] == 12.5
-    table = pandas.read_csv(one / "sweep.csv")
+    table = pandas.read_csv(first_folder / "sweep.csv")
     assert list(table.columns) == ["mu_d", "v_driver [m/s]", "final_x [m]", "final_v [m/s]", "slips", "error"]
     assert (table["slips"].to_numpy().reshape(4, 3) == data["slips"].to_numpy()).all()
     points = [[mu_d, v] for mu_d in (0.5, 0.6, 0.7, 0.8) for v in (0.025, 0.05, 0.1)]
@@ -142,10 +144,10 @@ def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(comma
 
 def test_failed_runs_are_reported_on_screen_in_files_and_in_the_exit_status(command, tmp_path):
     vary = ("--vary", "mu_d=0.5:1:5", "--vary", "m=-1,2")
-    done = command("sweep", "stickslip", *vary, "--set", "k=100", "--workers", 1, "--name", "mine")
-    assert done.returncode == 1
-    assert "10 runs, 0 of them resumed, 6 failed" in done.stdout
-    first, *kinds = done.stderr.splitlines()
+    result = command("sweep", "stickslip", *vary, "--set", "k=100", "--workers", 1, "--name", "mine")
+    assert result.returncode == 1
+    assert "10 runs, 0 of them resumed, 6 failed" in result.stdout
+    first, *kinds = result.stderr.splitlines()
     assert first.startswith("Error: 6 of 10 runs failed; see the error column of ")
     assert [kind.partition(":")[0] for kind in kinds] == [
         "5 runs, such as mu_d = 0.5, m = -1.0",
@@ -178,28 +180,28 @@ REASONS = {  # why some have no run to show
 def test_an_external_fmu_is_swept_or_refused_with_a_reason(command, tmp_path, name):
     """Only numbers are measured: each element of an array, and no strings."""
     fmu, vary = external_fmus.build_external_fmus() / f"{name}.fmu", external_fmus.SWEEP_AXES[name].replace(":3", ":2")
-    done = command(
+    result = command(
         "sweep", fmu, "--vary", vary, "--measures", "final,largest", "--name", "a", "--rtol", 1e-3, "--workers", 1
     )
     if name in REASONS:
-        assert (done.returncode, REASONS[name] in done.stderr) == (1, True)
+        assert (result.returncode, REASONS[name] in result.stderr) == (1, True)
         return
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (result.returncode, result.stderr) == (0, "")
     data = open_sweep(tmp_path / "results/sweep/a").drop_vars("error")
     assert len(data.data_vars) >= 2
-    for measured in data.data_vars.values():
-        assert np.isfinite(measured.to_numpy()).all()
-    assert any(len(set(measured.to_numpy().tolist())) == 2 for measured in data.data_vars.values())
+    for variable in data.data_vars.values():
+        assert np.isfinite(variable.to_numpy()).all()
+    assert any(len(set(variable.to_numpy().tolist())) == 2 for variable in data.data_vars.values())
 
 
 @pytest.mark.campaign
 def test_crashing_and_failing_runs_of_an_external_fmu_are_reported_individually(command, tmp_path):
     """With kind 0 it succeeds, with 2 it crashes, with 6 it fails."""
     trouble = external_fmus.build_external_fmus() / "Faulty.fmu"
-    done = command("sweep", trouble, "--vary", "kind=2,6,0", "--name", "a", "--workers", 2)
-    assert done.returncode == 1
-    assert done.stderr.startswith("Error: 2 of 3 runs failed")
-    assert "its binary crashed" in done.stderr
+    result = command("sweep", trouble, "--vary", "kind=2,6,0", "--name", "a", "--workers", 2)
+    assert result.returncode == 1
+    assert result.stderr.startswith("Error: 2 of 3 runs failed")
+    assert "its binary crashed" in result.stderr
     error = open_sweep(tmp_path / "results/sweep/a")["error"].to_numpy().tolist()
     assert [bool(sentence) for sentence in error] == [True, True, False]
 
@@ -207,8 +209,8 @@ def test_crashing_and_failing_runs_of_an_external_fmu_are_reported_individually(
 def test_sweeps_of_different_ranges_have_separate_folders(sweep, tmp_path):
     for values in ([1.0, 2.0], [1.0, 3.0]):
         sweep("smd", {"m": values}, folder=tmp_path, stop=0.1)
-    stored = [harness.load_result(folder)["m"].to_numpy().tolist() for folder in (tmp_path / "sweep").iterdir()]
-    assert sorted(stored) == [[1.0, 2.0], [1.0, 3.0]]
+    stored_masses = [harness.load_result(folder)["m"].to_numpy().tolist() for folder in (tmp_path / "sweep").iterdir()]
+    assert sorted(stored_masses) == [[1.0, 2.0], [1.0, 3.0]]
 
 
 def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(sweep):
@@ -223,11 +225,11 @@ def test_a_profiler_that_keeps_frames_disturbs_no_run(sweep):
     grid, frames = {"mu_d": [0.5, 0.6]}, []
     sys.setprofile(lambda frame, event, value: frames.append(frame) if frame.f_code.co_name == "read_rows" else None)
     try:
-        profiled = sweep("stickslip", grid, measures=("peak_speed",))
+        data = sweep("stickslip", grid, measures=("peak_speed",))
     finally:
         sys.setprofile(None)
     assert frames
-    assert profiled["peak_speed"].equals(sweep("stickslip", grid, measures=("peak_speed",))["peak_speed"])
+    assert data["peak_speed"].equals(sweep("stickslip", grid, measures=("peak_speed",))["peak_speed"])
 
 
 @pytest.mark.parametrize("grid", [{"m": [1e308]}, {"m": [2e307, 1e308], "k": [1.0, 1e308]}, {"m": [1.0, 1e308]}])

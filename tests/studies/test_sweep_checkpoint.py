@@ -27,23 +27,23 @@ def sweep(folder, fmu="fmus/smd.fmu", masses=MASSES, **options):
 def interrupt_at(fraction):
     """Return a callback for the progress that interrupts a sweep."""
 
-    def report(done):
-        if done >= fraction:
+    def report(share):
+        if share >= fraction:
             raise KeyboardInterrupt
 
     return report
 
 
-def interrupted(folder, fraction=0.3, **options):
+def interrupt_sweep(folder, fraction=0.3, **options):
     """Interrupt a sweep, and return the file of its checkpoint and the number of its finished runs."""
-    with pytest.raises(HarnessError, match=r"interrupted: \d+ of \d+ runs are finished") as stopped:
+    with pytest.raises(HarnessError, match=r"interrupted: \d+ of \d+ runs are finished") as error:
         sweep(folder, progress=interrupt_at(fraction), **options)
     (file,) = (Path(folder) / "sweep").glob(".*.checkpoint")
-    return file, int(str(stopped.value).split()[1])
+    return file, int(str(error.value).split()[1])
 
 
 @pytest.fixture(scope="module")
-def undisturbed(fmus):
+def complete_data(fmus):
     """The data of the whole sweep."""
     return sweep(None, fmus / "smd.fmu").data
 
@@ -62,17 +62,17 @@ def in_folder(in_workspace, monkeypatch):
     monkeypatch.setattr("harness.studies.sweep.figure.draw", lambda *arguments: None)
 
 
-def test_an_interrupted_sweep_is_resumed(undisturbed):
-    _, n_done = interrupted("here")
+def test_an_interrupted_sweep_is_resumed(complete_data):
+    _, n_done = interrupt_sweep("here")
     assert 2 < n_done < len(MASSES)
-    assert_resumed("here", n_done, undisturbed)
-    assert [bool(text) for text in undisturbed["error"].to_numpy()] == [mass < 0 for mass in MASSES]
+    assert_resumed("here", n_done, complete_data)
+    assert [bool(text) for text in complete_data["error"].to_numpy()] == [mass < 0 for mass in MASSES]
 
 
 def test_missing_runs_are_found_in_every_part():
     masses = np.linspace(1.0, 2.0, 2100)
     expected = sweep("there", masses=masses)["final_x"].to_numpy()
-    file, _ = interrupted("here", 1.0, masses=masses)
+    file, _ = interrupt_sweep("here", 1.0, masses=masses)
     lines = file.read_text().splitlines(keepends=True)
     assert len(lines) > 4
     file.write_text("".join(line for i, line in enumerate(lines) if i not in (0, 3, len(lines) - 1)))
@@ -106,57 +106,57 @@ DAMAGE = {
 
 
 @pytest.mark.parametrize("cut", [1, 5])
-def test_a_checkpoint_that_is_cut_off_resumes_from_its_complete_blocks(undisturbed, cut):
+def test_a_checkpoint_that_is_cut_off_resumes_from_its_complete_blocks(complete_data, cut):
     """Of the last block, its line break or more is missing."""
-    file, n_done = interrupted("here")
+    file, n_done = interrupt_sweep("here")
     _, last_block, _ = json.loads(file.read_text().splitlines()[-1])
     file.write_bytes(file.read_bytes()[:-cut])
-    assert_resumed("here", n_done - len(last_block), undisturbed)
+    assert_resumed("here", n_done - len(last_block), complete_data)
 
 
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
-def test_a_damaged_checkpoint_is_reported_and_its_runs_are_repeated(undisturbed, damage):
-    file, _ = interrupted("here")
+def test_a_damaged_checkpoint_is_reported_and_its_runs_are_repeated(complete_data, damage):
+    file, _ = interrupt_sweep("here")
     damage(file)
     result = sweep("here")
     assert (result.n_resumed, result.damaged) == (0, True)
     assert "10 runs, 0 of them resumed" in str(result)
     assert "the checkpoint of an interrupted sweep was damaged" in str(result)
-    assert result.data.equals(undisturbed)
+    assert result.data.equals(complete_data)
 
 
-def test_the_content_of_the_fmu_is_part_of_the_identity_of_a_sweep(undisturbed):
+def test_the_content_of_the_fmu_is_part_of_the_identity_of_a_sweep(complete_data):
     """Its folder is not."""
     Path("elsewhere").mkdir()
-    _, n_done = interrupted("here")
+    _, n_done = interrupt_sweep("here")
     name, text = "documentation/licenses/license.txt", "another text"
     external_fmus.edited_copy("fmus/smd.fmu", "elsewhere/smd.fmu", {name: text})
     assert sweep("here", "elsewhere/smd.fmu").n_resumed == 0
     shutil.copy("fmus/smd.fmu", "elsewhere/smd.fmu")
     result = sweep("here", "elsewhere/smd.fmu")
     assert result.n_resumed == n_done
-    assert result.data.equals(undisturbed)
+    assert result.data.equals(complete_data)
 
 
 def test_a_checkpoint_that_cannot_be_used_is_reported():
-    file, _ = interrupted("here")
+    file, _ = interrupt_sweep("here")
     file.unlink()
     file.mkdir()
     with pytest.raises(HarnessError, match=r"cannot use the checkpoint .*\.checkpoint: Is a directory$"):
         sweep("here")
 
 
-def test_a_second_command_with_the_same_sweep_is_refused(undisturbed):
+def test_a_second_command_with_the_same_sweep_is_refused(complete_data):
     """While the first one runs."""
     refusals = []
 
-    def repeat(done):
-        if done < 1.0:
+    def repeat(share):
+        if share < 1.0:
             with pytest.raises(HarnessError, match="another command runs this sweep; wait until it has finished"):
                 sweep("here")
-            refusals.append(done)
+            refusals.append(share)
 
-    assert sweep("here", progress=repeat).data.equals(undisturbed)
+    assert sweep("here", progress=repeat).data.equals(complete_data)
     assert refusals
 
 

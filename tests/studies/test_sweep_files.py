@@ -34,14 +34,14 @@ def short_sweep(fmus):
 )
 def test_an_axis_spanning_decades_is_logarithmic(short_sweep, values, spread, kind):
     """That of a parameter, and that of a measure."""
-    replaced = {"final_x": ("m", np.array(values), short_sweep["final_x"].attrs | {"scale": spread})}
+    replacements = {"final_x": ("m", np.array(values), short_sweep["final_x"].attrs | {"scale": spread})}
     if np.isfinite(values).all():
-        replaced |= {"m": ("m", np.array(values), short_sweep["m"].attrs | {"scale": spread})}
-    short_sweep.dataset = short_sweep.data.assign(replaced)
+        replacements |= {"m": ("m", np.array(values), short_sweep["m"].attrs | {"scale": spread})}
+    short_sweep.dataset = short_sweep.data.assign(replacements)
     axes = Figure().subplots()
     short_sweep._draw_panel(axes)
     assert axes.get_yscale() == kind
-    assert "m" not in replaced or axes.get_xscale() == kind
+    assert "m" not in replacements or axes.get_xscale() == kind
 
 
 def test_no_text_is_run_as_python():

@@ -37,7 +37,7 @@ def harness(workspace):
 
 
 @pytest.fixture
-def undisturbed(fmus):
+def complete_files(fmus):
     """Return the files of an undisturbed sweep, by name."""
 
     def make(folder):
@@ -76,7 +76,7 @@ def started_sweep(folder):
 
 
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="the system cannot wait for the end of a grandchild")
-def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_path):
+def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, complete_files, tmp_path):
     """A kill reaches only the sweep, Ctrl-C in a terminal also its workers."""
     with started_sweep(tmp_path) as (process, worker):
         process.kill()
@@ -93,10 +93,10 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_p
     done_runs = finished_runs(tmp_path)
     assert 0 < first < done_runs < 100
 
-    done = harness(*LONG)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert f"100 runs, {done_runs} of them resumed" in done.stdout
-    assert files(tmp_path) == undisturbed
+    result = harness(*LONG)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert f"100 runs, {done_runs} of them resumed" in result.stdout
+    assert files(tmp_path) == complete_files
     assert checkpoint_file(tmp_path) is None
     bound = tmp_path / "bound"  # workers use pipes; a socket whose address is a file is no port
     assert "tuple" not in (bound.read_text() if bound.exists() else "")
@@ -124,6 +124,6 @@ def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(fmus, tmp
     data = sweep(fmu, {"k": range(1, 41)}, stop=0.1, workers=2)
     errors = {int(k): str(data["error"].sel(k=k).item()) for k in data["k"].values}
     assert {k: text for k, text in errors.items() if text} == dict.fromkeys((7, 30), "the process died in this run")
-    spared = sweep(fmus / "smd.fmu", {"k": range(1, 41)}, stop=0.1)["final_x"]
-    assert (np.isnan(data["final_x"]) | (data["final_x"] == spared)).all()
+    expected = sweep(fmus / "smd.fmu", {"k": range(1, 41)}, stop=0.1)["final_x"]
+    assert (np.isnan(data["final_x"]) | (data["final_x"] == expected)).all()
     assert (tmp_path / "killed by 1.0").exists()

@@ -24,38 +24,38 @@ class Browser:
         self.temporary_folder = TemporaryDirectory(
             ignore_cleanup_errors=True
         )  # a child of Chromium may still be writing
-        ours, other_table = zip(*(self.pipe(i) for i in (1, 0)), strict=True)
+        own_ends, browser_ends = zip(*(self.pipe(i) for i in (1, 0)), strict=True)
 
         def connect_pipes():
-            os.dup2(other_table[0], READS)
-            os.dup2(other_table[1], WRITES)
+            os.dup2(browser_ends[0], READS)
+            os.dup2(browser_ends[1], WRITES)
 
         arguments = (f"--user-data-dir={self.temporary_folder.name}/profile", "--remote-debugging-pipe", "about:blank")
         quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         self.process = subprocess.Popen(
             [CHROMIUM, *FLAGS, *arguments], pass_fds=(READS, WRITES), preexec_fn=connect_pipes, **quiet
         )
-        for their in other_table:
-            os.close(their)
-        self.out, self.into = os.fdopen(ours[0], "wb", 0), os.fdopen(ours[1], "rb")
+        for end in browser_ends:
+            os.close(end)
+        self.out, self.into = os.fdopen(own_ends[0], "wb", 0), os.fdopen(own_ends[1], "rb")
         self.numbers, self.buffer = itertools.count(1), b""
         self.console, self.requested_urls, self.session = [], [], None
         targets = self.call("Target.getTargets")["targetInfos"]
-        target = next(their["targetId"] for their in targets if their["type"] == "page")
+        target = next(info["targetId"] for info in targets if info["type"] == "page")
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
-        self.loaded = False
+        self.is_loaded = False
 
     @staticmethod
-    def pipe(ours):
-        """Create a pipe on high file descriptors and return our end and the browser's; `ours` is 1 to write, 0 to
+    def pipe(own_end):
+        """Create a pipe on high file descriptors and return our end and the browser's; `own_end` is 1 to write, 0 to
         read."""
         ends = os.pipe()
         high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 20) for end in ends]
         for end in ends:
             os.close(end)
-        return high[ours], high[1 - ours]
+        return high[own_end], high[1 - own_end]
 
     def call(self, method, **parameters):
         """Send a command and return its result; record the events that arrive before it."""
@@ -88,16 +88,16 @@ class Browser:
             case "Network.requestWillBeSent":
                 self.requested_urls.append(parameters["request"]["url"])
             case "Page.loadEventFired":
-                self.loaded = True
+                self.is_loaded = True
         return message
 
     def open(self, address):
         """Load an address and wait for the load event. Load an empty page first, so that the same address is loaded
         again."""
         for item in ("about:blank", address):
-            self.loaded, self.console, self.requested_urls = False, [], []
+            self.is_loaded, self.console, self.requested_urls = False, [], []
             self.call("Page.navigate", url=item)
-            while not self.loaded:
+            while not self.is_loaded:
                 self.receive()
 
     def run(self, script):
@@ -125,9 +125,9 @@ class Browser:
         features = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self.call("Emulation.setEmulatedMedia", features=features)
 
-    def picture(self, whole=False):
+    def picture(self, full_page=False):
         """Take a screenshot, as PNG."""
-        return b64decode(self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"])
+        return b64decode(self.call("Page.captureScreenshot", captureBeyondViewport=full_page)["data"])
 
     def pdf(self):
         return b64decode(self.call("Page.printToPDF", printBackground=True, preferCSSPageSize=True)["data"])

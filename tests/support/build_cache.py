@@ -22,7 +22,7 @@ from fmus.packaging.native import binaries as compiler
 
 shared_folder = Path()  # of this test run; set by conftest.py
 kept_folder = Path()  # of all test runs with the same sources; set by conftest.py
-UNOPTIMISED = ("-O0", "-fno-sanitize=undefined", *compiler.BIT_EXACT[1:])
+UNOPTIMISED_FLAGS = ("-O0", "-fno-sanitize=undefined", *compiler.BIT_EXACT[1:])
 
 
 def digest_sources():
@@ -42,13 +42,13 @@ def open_kept_folder(parent):
     """Return the folder in `parent` for builds of the present sources, and its lock; remove those of other sources
     that no test run uses."""
     digest = digest_sources()
-    for outdated in (path for path in parent.iterdir() if path.is_dir() and path.name != digest):
-        with (parent / f"{outdated.name}.lock").open("w") as lock:
+    for outdated_folder in (path for path in parent.iterdir() if path.is_dir() and path.name != digest):
+        with (parent / f"{outdated_folder.name}.lock").open("w") as lock:
             try:
                 flock(lock, LOCK_EX | LOCK_NB)
             except BlockingIOError:
                 continue
-            rmtree(outdated)
+            rmtree(outdated_folder)
             Path(lock.name).unlink()
     lock = (parent / f"{digest}.lock").open("w")
     flock(lock, LOCK_SH)
@@ -56,16 +56,16 @@ def open_kept_folder(parent):
     return parent / digest, lock
 
 
-def build(*words, folder=ROOT, optimised=False):
+def build(*words, folder=ROOT, optimise=False):
     """Run the build command in this process, where models stay lowered, and return its standard output.
 
     Optimisation changes no digit, but takes four fifths of the time of a compiler, so that native FMUs have none unless
-    `optimised` is true.
+    `optimise` is true.
     """
-    with nullcontext() if optimised else patch.object(compiler, "BIT_EXACT", UNOPTIMISED):
-        done = commands.build(*words, folder=folder)
-    assert (done.returncode, done.stderr) == (0, "")
-    return done.stdout
+    with nullcontext() if optimise else patch.object(compiler, "BIT_EXACT", UNOPTIMISED_FLAGS):
+        result = commands.build(*words, folder=folder)
+    assert (result.returncode, result.stderr) == (0, "")
+    return result.stdout
 
 
 def name_build(kind, *words):
@@ -74,26 +74,26 @@ def name_build(kind, *words):
     return " ".join((kind, *digests))
 
 
-def build_once(*words, optimised=False):
+def build_once(*words, optimise=False):
     """Return the folder with the FMUs built with these arguments; the output of the build is in a file .txt beside
     it."""
-    name = name_build("optimised" if optimised else "unoptimised", *words)
+    name = name_build("optimised" if optimise else "unoptimised", *words)
 
     def make(folder):
-        (kept_folder / f"{name}.txt").write_text(build(*map(str, words), "--out", folder, optimised=optimised))
+        (kept_folder / f"{name}.txt").write_text(build(*map(str, words), "--out", folder, optimise=optimise))
 
     return keep_build(name, make)
 
 
-def build_user_model(path, *words, optimised=False):
+def build_user_model(path, *words, optimise=False):
     """Copy a model file to a folder outside the project, build it there, and return the folder."""
 
     def make(folder):
         (folder / path.name).write_text(path.read_text())
-        printed = build(path.name, *words, folder=folder, optimised=optimised)
-        assert printed.startswith(f"{path.stem}.fmu ")
+        output = build(path.name, *words, folder=folder, optimise=optimise)
+        assert output.startswith(f"{path.stem}.fmu ")
 
-    return keep_build(name_build("user optimised" if optimised else "user", path, *words), make)
+    return keep_build(name_build("user optimised" if optimise else "user", path, *words), make)
 
 
 def run_published_cases():
@@ -102,8 +102,8 @@ def run_published_cases():
 
     def make(folder):
         (folder / "fmus").symlink_to(build_once())
-        done = commands.run_process(folder, COLUMNS="80")
-        (folder / "process.json").write_text(json.dumps([done.returncode, done.stdout, done.stderr]))
+        result = commands.run_process(folder, COLUMNS="80")
+        (folder / "process.json").write_text(json.dumps([result.returncode, result.stdout, result.stderr]))
 
     return cached_folder("published", make)
 

@@ -69,7 +69,7 @@ def decay_record(
     return Signal(t, step * np.round(x / step) if step else x, base + ("", "/s", "/s2")[order])
 
 
-def random_record(seed, law=None, sine=None, quantised=None, samples=None, order=0):
+def random_record(seed, law=None, sine=None, is_quantised=None, samples=None, order=0):
     """Return a random signal, its true parameters, and whether it is a pendulum.
 
     Law, amplitude, rate and noise are random; a third of the records are quantised and half are pendulums. The record
@@ -82,21 +82,21 @@ def random_record(seed, law=None, sine=None, quantised=None, samples=None, order
     if sine and order == 2:
         a = min(a, 1.4)  # beyond 90 degrees the acceleration has two peaks per swing
     omega = 10 ** rng.uniform(-0.3, 2)
-    lost = dict(
+    losses = dict(
         zip(law, rng.dirichlet(np.ones(len(law))) * 10 ** rng.uniform(-2, -0.7), strict=True)
     )  # relative to a, at first
     truth = {
-        "zeta": lost.get("zeta", 0.0) / np.pi,
-        "r": lost.get("r", 0.0) * (min(a, 1.0) if sine else a) / 2,
-        "b": lost.get("b", 0.0) * 0.75 / a,
+        "zeta": losses.get("zeta", 0.0) / np.pi,
+        "r": losses.get("r", 0.0) * (min(a, 1.0) if sine else a) / 2,
+        "b": losses.get("b", 0.0) * 0.75 / a,
     }
     swings = rng.uniform(6, 80)
     samples = int(10 ** rng.uniform(2.7, 4)) if samples is None else samples
     t = np.linspace(0, swings * np.pi / omega, max(samples, int(12 * swings)))
     size = a * omega**order
     noise = size * 10 ** rng.uniform(-4, -1.7)
-    quantised = rng.random() < 1 / 3 if quantised is None else quantised
-    step = noise * 10 ** rng.uniform(-0.5, 1) if quantised else 0.0
+    is_quantised = rng.random() < 1 / 3 if is_quantised is None else is_quantised
+    step = noise * 10 ** rng.uniform(-0.5, 1) if is_quantised else 0.0
     turn = rng.uniform(-1, 0.3) * np.pi / omega
     rest = rng.normal() * size
     if sine and a > 2:
@@ -109,7 +109,7 @@ def random_record(seed, law=None, sine=None, quantised=None, samples=None, order
         a=a,
         rest=rest,
         t=t,
-        noise=0.3 * noise if quantised else noise,
+        noise=0.3 * noise if is_quantised else noise,
         step=step,
         order=order,
         side=rng.choice([-1.0, 1.0]),

@@ -18,27 +18,27 @@ def call(*command, cwd, status=0, **environment):
     """Run a command, which must exit with this status, and return both of its outputs."""
     others = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     environment = others | {key: str(value) for key, value in environment.items()}
-    done = subprocess.run([*map(str, command)], cwd=cwd, env=environment, capture_output=True, text=True, timeout=300)
-    assert done.returncode == status, done.stdout + done.stderr
-    return done.stdout + done.stderr
+    result = subprocess.run([*map(str, command)], cwd=cwd, env=environment, capture_output=True, text=True, timeout=300)
+    assert result.returncode == status, result.stdout + result.stderr
+    return result.stdout + result.stderr
 
 
 def required_distributions(*extras):
     """Return the distributions that the project and these of its extras require, and those that they require."""
-    found, waiting = {}, [(PROJECT["dependencies"], "")]
+    distributions, waiting = {}, [(PROJECT["dependencies"], "")]
     waiting += [(PROJECT["optional-dependencies"][extra], "") for extra in extras]
-    visited = set()
+    visited_requirements = set()
     while waiting:
         texts, active_extra = waiting.pop()
         for requirement in map(Requirement, texts):
             if requirement.marker and not requirement.marker.evaluate({"extra": active_extra}):
                 continue
             for extra in ("", *requirement.extras):
-                if (requirement.name, extra) not in visited:
-                    visited.add((requirement.name, extra))
-                    found[requirement.name] = package = distribution(requirement.name)
+                if (requirement.name, extra) not in visited_requirements:
+                    visited_requirements.add((requirement.name, extra))
+                    distributions[requirement.name] = package = distribution(requirement.name)
                     waiting.append((package.requires or [], extra))
-    return list(found.values())
+    return list(distributions.values())
 
 
 def make_environment(folder, *extras):

@@ -17,7 +17,7 @@ def build_fmi3_fmus():
     return build_cache.build_once("--fmi", "3", "--platform", "linux64")
 
 
-REDUCED = {"stickslip": ("ode23", "hybrid"), "coulomb": ("rodas", "sign")}
+REDUCED_FEATURES = {"stickslip": ("ode23", "hybrid"), "coulomb": ("rodas", "sign")}
 
 
 @cache
@@ -26,7 +26,7 @@ def build_reduced_fmu(name):
     require_compiler()
 
     def make(folder):
-        method, law = REDUCED[name]
+        method, law = REDUCED_FEATURES[name]
         options = ("--method", method, "--law", law, "--platform", "linux64")
         build_cache.build("--fmi", "3", name, *options, "--out", folder)
 

@@ -130,7 +130,7 @@ def divided_difference(nodes, s):
     return row[0]
 
 
-class Stuck:
+class Standstill:
     """A mass at rest."""
 
     @staticmethod
@@ -157,12 +157,12 @@ class ClosedFormMotion:
         mode = (int(sign(self.v)) or direction(load, rate, system.hold)) if system.dry else 1
         net = load - mode * system.slide
         while True:
-            stuck = system.dry and mode == 0
-            piece = Stuck() if stuck else LinearSegment(system, net, self.v)
+            is_stuck = system.dry and mode == 0
+            piece = Standstill() if is_stuck else LinearSegment(system, net, self.v)
             self.append(mode, piece)
             if not system.dry:
                 s = None
-            elif stuck:
+            elif is_stuck:
                 s = None if rate == 0 else (sign(rate) * system.hold - load) / rate
             else:
                 s = piece.turning_point(mode, end - self.t, catches=system.hold > system.slide)
@@ -172,8 +172,8 @@ class ClosedFormMotion:
             self.move(system, piece, s)
             self.v, load = mpf(0), system.load(self.x, self.drive)
             # at a breakaway the load equals the limit by definition, so that rounding does not decide the direction
-            mode = int(sign(rate)) if stuck else direction(load, rate, system.hold)
-            net = mode * (system.hold - system.slide) if stuck else load - mode * system.slide
+            mode = int(sign(rate)) if is_stuck else direction(load, rate, system.hold)
+            net = mode * (system.hold - system.slide) if is_stuck else load - mode * system.slide
 
     def append(self, mode, piece):
         if self.modes and mode != self.modes[-1]:

@@ -185,8 +185,10 @@ def load_vector_model(source):
     if model.is_linear:
         pass_vectors_to(sys.modules[f"{PACKAGE}.runtime.linear_closed_form"].LinearClosedForm)
     methods = {name: declaration(model, name) for name in vars(model)}
-    wrapped = {name: call_with_scalars(model, name, types) for name, types in methods.items() if takes_vectors(types)}
-    return type(model.__name__, (model,), {"__module__": module.__name__, **wrapped})()
+    wrapped_methods = {
+        name: call_with_scalars(model, name, types) for name, types in methods.items() if takes_vectors(types)
+    }
+    return type(model.__name__, (model,), {"__module__": module.__name__, **wrapped_methods})()
 
 
 def fill_indices(model):
@@ -231,14 +233,14 @@ def store_vectors_as_lists(cls):
 
 def call_with_scalars(cls, name, types):
     """Wrap a method of the model so that it takes and returns vectors; a single contact needs no index."""
-    returned = types.get("return")
-    results = get_args(returned) if get_origin(returned) is tuple else (returned,)
+    return_type = types.get("return")
+    results = get_args(return_type) if get_origin(return_type) is tuple else (return_type,)
 
     def call(self, t, *arguments):
         arguments = arguments[:-1] if ContactIndex in types.values() else arguments
         scalars = [x for argument in arguments for x in (argument if isinstance(argument, list) else [argument])]
         result = getattr(cls, name)(self, t, *scalars)
-        if returned is Rates:
+        if return_type is Rates:
             y, rates = arguments[0], iter(result if isinstance(result, tuple) else (result,))
             return Vector(next(rates) if is_dynamic[i] else y[rate_index[i]] for i in state_indices)
         if name == "jacobian":
@@ -264,9 +266,9 @@ def pass_vectors_to(closed_form):
     )
 
     def state_at_standstill(self, t):
-        x, v, lost = state(self, t)
-        return (x, v), lost
+        x, v, x_roundoff = state(self, t)
+        return (x, v), x_roundoff
 
-    closed_form.start_segment = lambda self, y, a, p, lost: start(self, *y, a, p, lost)
+    closed_form.start_segment = lambda self, y, a, p, x_roundoff: start(self, *y, a, p, x_roundoff)
     closed_form.next_standstill = lambda self, modes: standstill(self, modes[0])
     closed_form.state_at_standstill = state_at_standstill

@@ -58,8 +58,8 @@ def declared(name):
     source = find_model(name)
     variables = dict(declared_variables(scalar_class(source)))
     method = variables["solver.method"] = copy(variables["solver.method"])
-    offered = select_features(source).methods
-    method.items = tuple(item for item in method.items if item[0] in offered)
+    methods = select_features(source).methods
+    method.items = tuple(item for item in method.items if item[0] in methods)
     return variables
 
 
@@ -108,12 +108,12 @@ def experiment(name, values):
 
 def cover(groups):
     """Return a few of these cases, given with their properties, that have every property."""
-    selected, missing = [], set().union(*(properties for _, properties in groups))
+    cases, missing = [], set().union(*(properties for _, properties in groups))
     while missing:
         case, properties = max(groups, key=lambda group: len(group[1] & missing))
-        selected.append(case)
+        cases.append(case)
         missing -= properties
-    return selected
+    return cases
 
 
 def pairwise_cases(name, size=2):

@@ -20,7 +20,7 @@ def require_compiler():
 def build_native_fmus():
     """Return the folder of the native FMUs for Linux."""
     require_compiler()
-    return build_cache.build_once("--native", "--platform", "linux64", optimised=True)
+    return build_cache.build_once("--native", "--platform", "linux64", optimise=True)
 
 
 @cache
@@ -30,7 +30,7 @@ def build_for_all_platforms():
     require_compiler()
     options = ("smd", "--native", "--method", "exact")
     platforms = (word for item in PLATFORMS for word in ("--platform", item))
-    return build_cache.build_once(*options, *platforms, optimised=True)
+    return build_cache.build_once(*options, *platforms, optimise=True)
 
 
 @pytest.fixture(params=["python", "native"])

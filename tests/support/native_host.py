@@ -95,9 +95,9 @@ def run_host(program, library, fmu, script, threads=1, environment=None):
     resources = folder.as_uri() if version == "2" else f"{folder}{os.sep}"
     command = [str(word) for word in (*program, library, guid, resources, threads)]
     options = {"capture_output": True, "text": True, "timeout": 120, "env": environment}
-    done = subprocess.run(command, input="\n".join(script), **options)
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout.splitlines(), done.stderr
+    result = subprocess.run(command, input="\n".join(script), **options)
+    assert result.returncode == 0, result.stderr[-3000:]
+    return result.stdout.splitlines(), result.stderr
 
 
 @cache

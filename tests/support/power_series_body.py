@@ -19,17 +19,17 @@ class Body:
     def __init__(self, m=1.0, k=0.0, c=0.0, hold=0.0, slide=0.0, u=0.0, x=0.0, v=0.0):
         self.m, self.k, self.c, self.hold, self.slide, self.u = map(Decimal, (m, k, c, hold, slide, u))
         self.t, self.x, self.v, self.mode, self.events = Decimal(0), Decimal(x), Decimal(v), 0, []
-        self.force, self.pushed = [Decimal(0)], Decimal(0)
+        self.force, self.push_time = [Decimal(0)], Decimal(0)
 
     def push(self, *force):
         """Set the force and its leading derivatives at the current time; higher derivatives continue."""
-        self.force, self.pushed = [*map(Decimal, force), *self.course()[len(force) :]], self.t
+        self.force, self.push_time = [*map(Decimal, force), *self.course()[len(force) :]], self.t
         before, self.mode = self.mode, self.next_mode()
         self.events += [self.t] * bool(self.hold and self.t and self.mode != before)
 
     def course(self):
         """Return the current force and its derivatives."""
-        s, n_terms = self.t - self.pushed, len(self.force)
+        s, n_terms = self.t - self.push_time, len(self.force)
         return [value([self.force[j] / factorial(j - n) for j in range(n, n_terms)][::-1], s) for n in range(n_terms)]
 
     def forces(self):
@@ -59,13 +59,13 @@ class Body:
 
     def release(self):
         """Return the time until breakaway and its direction."""
-        load, *others = [one / factorial(n) for n, one in enumerate(self.forces())]
+        load, *others = [derivative / factorial(n) for n, derivative in enumerate(self.forces())]
         candidates = [(Decimal("inf"), 0)]
         for side in 1, -1:
             terms = [load - side * self.hold, *others]
             while terms and not terms[-1]:
                 terms.pop()
-            rates = [n * one for n, one in enumerate(terms)][1:]
+            rates = [n * term for n, term in enumerate(terms)][1:]
             for root in np.polynomial.polynomial.polyroots([*map(float, terms or [1])]):
                 wait = Decimal(root.real)
                 for _ in range(NEWTONS * (abs(root.imag) < 1e-9)):
@@ -107,8 +107,8 @@ def sign(number):
 def value(series, h):
     """Evaluate a polynomial from its coefficients, highest order first."""
     total = Decimal(0)
-    for one in series:
-        total = total * h + one
+    for coefficient in series:
+        total = total * h + coefficient
     return total
 
 

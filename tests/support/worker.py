@@ -317,7 +317,7 @@ class Worker:
         return self._new(path, name, ModelExchange)
 
     def _new(self, path, name, kind):
-        fmu = self.unpacked(path)
+        fmu = self.unpack(path)
         self.instances.append((Instance if fmu[1].fmiVersion == "2.0" else kind)(fmu, name))
         return len(self.instances) - 1
 
@@ -330,7 +330,7 @@ class Worker:
             names, rows = options["input"]
             rows = [tuple(row) for row in rows]
             options["input"] = np.array(rows, dtype=[(name, float) for name in ("time", *names)])
-        (folder, options["model_description"]), count = self.unpacked(path), [0]
+        (folder, options["model_description"]), count = self.unpack(path), [0]
         plain = FMU3Model.getContinuousStateDerivatives
 
         def count_and_call(*arguments):
@@ -344,7 +344,7 @@ class Worker:
             return {"error": str(error)}
         return {"columns": {name: table[name].tolist() for name in table.dtype.names}, "evaluations": count[0]}
 
-    def unpacked(self, path):
+    def unpack(self, path):
         """Return the folder and the description of an FMU."""
         if path not in self.fmus:
             directory = extract(path, tempfile.mkdtemp(dir=self.temporary_folder))

@@ -25,9 +25,9 @@ def run_script(script, function, *arguments, **options):
 def run_script_with_stderr(script, function, *arguments, folder=None, timeout=300):
     """Return the result and standard error of a function of a script."""
     command = [*isolated_python(script), function, json.dumps(arguments, default=str)]
-    done = subprocess.run(command, cwd=folder, env=environment(), capture_output=True, text=True, timeout=timeout)
-    assert done.returncode == 0, f"exit status {done.returncode}: {done.stderr}"
-    return json.loads(done.stdout), done.stderr
+    result = subprocess.run(command, cwd=folder, env=environment(), capture_output=True, text=True, timeout=timeout)
+    assert result.returncode == 0, f"exit status {result.returncode}: {result.stderr}"
+    return json.loads(result.stdout), result.stderr
 
 
 def isolated_python(script):
@@ -145,7 +145,7 @@ class Instance:
     """An instance in the worker, with the methods of worker.Instance."""
 
     def __init__(self, worker, number):
-        self.worker, self.number, self.freed = worker, number, False
+        self.worker, self.number, self.is_freed = worker, number, False
 
     def __getattr__(self, function):
         return lambda *arguments: self.worker.call(self.number, function, *arguments)
@@ -172,5 +172,5 @@ class Instance:
         return first + [row for rows in others for row in rows[1:]]
 
     def free(self):
-        self.freed = True
+        self.is_freed = True
         self.worker.call(self.number, "free")

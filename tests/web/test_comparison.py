@@ -16,9 +16,9 @@ def test_a_slow_method_is_previewed_with_a_fast_one(page):
         "const [ghost, own] = app.plots.get('x').panel.content.curves.slice(-2);"
         "done([main.done, main.setting.values.k, preview.setting.values, ghost.x.at(-1), own.x.at(-1)]) }) })"
     )
-    done, k, quick, reached, full = values
-    assert (done, quick) == (False, {"x_m": 0.001, "k": k})
-    assert full < reached <= 16
+    is_done, k, preview_values, preview_end, run_end = values
+    assert (is_done, preview_values) == (False, {"x_m": 0.001, "k": k})
+    assert run_end < preview_end <= 16
     assert page.when_done("app.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [
         16,
         16,
@@ -30,16 +30,16 @@ def test_comparing_two_laws_shows_the_difference_and_the_counters(page):
     page.open(".model=coulomb")
     page.choose("comparison", "coulomb")
     assert page.run("app.runs.comparison.setting.values.friction") == 2
-    apart = page.run(
+    difference = page.run(
         "(() => { const { main, comparison } = app.runs; return Math.max(...main.grid.map((row, i) => "
         "Math.abs(main.columns.x[row] - comparison.columns.x[comparison.grid[i]]))) })()"
     )
-    assert 1e-6 < apart < 1e-2
+    assert 1e-6 < difference < 1e-2
     rows = page.table("Cost and accuracy")
-    assert web_page.number(rows["largest difference in x"][1]) == pytest.approx(apart, rel=1e-2)
+    assert web_page.number(rows["largest difference in x"][1]) == pytest.approx(difference, rel=1e-2)
     assert rows["largest error of x against the closed form"][0] == "closed form"
-    one, other = (int(cell) for cell in rows["right-hand side evaluations"])
-    assert other > 20 * one
+    first_count, second_count = (int(cell) for cell in rows["right-hand side evaluations"])
+    assert second_count > 20 * first_count
     assert not any("time" in row for row in rows)  # the law that does more work may take less of it up to the stop
     assert not page.run("document.getElementById('panel-.error').hidden")
 
@@ -60,11 +60,11 @@ def test_a_failed_run_of_a_comparison_is_named_and_has_no_error(page, link, role
     assert page.run("document.getElementById('alert').textContent").startswith(f"The {role}")
     assert not any("difference" in row or "error" in row for row in page.table("Cost and accuracy"))
     assert page.run("app.plots.get('.error')?.figure.hidden ?? true")
-    failed = "comparison" if "second" in role else "main"
-    *_, ends = page.run(f"[0, ...app.runs.{failed}.time]")
+    run = "comparison" if "second" in role else "main"
+    *_, run_end = page.run(f"[0, ...app.runs.{run}.time]")
     curve = "app.plots.get('x').panel.content.curves.find(curve => curve.colour === {!r})"
-    shown = page.run(f"{curve.format('b' if 'second' in role else 'a')}?.x.at(-1) ?? 0")
-    assert shown == ends < page.run("app.state().stop")
+    curve_end = page.run(f"{curve.format('b' if 'second' in role else 'a')}?.x.at(-1) ?? 0")
+    assert curve_end == run_end < page.run("app.state().stop")
 
 
 def test_another_model_keeps_values_of_the_same_names(page):
@@ -81,8 +81,8 @@ def test_the_second_run_can_have_the_default_where_the_first_has_another_value(p
     page.choose("comparison-rtol", 0)
     values = page.run("app.runs.comparison.setting.values")
     assert (values["friction"], values["solver.rtol"]) == (1, 0)
-    shown = "['friction', 'rtol'].map(id => document.getElementById(`comparison-${id}`).value)"
-    assert page.run(shown) == ["1", "0"]
+    selections = "['friction', 'rtol'].map(id => document.getElementById(`comparison-${id}`).value)"
+    assert page.run(selections) == ["1", "0"]
     page.choose("comparison-method", 1)
     assert page.run("app.runs.comparison.setting.values['solver.method']") == 1
     assert page.run("app.runs.main.setting.values.friction") == 2

@@ -12,26 +12,26 @@ from models import MODELS, declared
 def test_the_default_run_shows_a_rest_that_begins_soon_after_the_default_stop_time(page, name):
     page.open(f".model={name}")
     stop = page.run("app.library.models.get(app.state().model).stop")
-    shown, rest = page.run("[app.state().stop, app.runs.main.restTime() ?? null]")
-    assert stop <= shown <= 1.2 * stop
+    shown_stop, rest = page.run("[app.state().stop, app.runs.main.restTime() ?? null]")
+    assert stop <= shown_stop <= 1.2 * stop
     if name == "coulomb":  # at rest after eight full swings
         assert rest == pytest.approx(8 * 2 * pi / sqrt(157.9), abs=1e-9)
-        assert stop == 4 < rest < shown - 0.1
+        assert stop == 4 < rest < shown_stop - 0.1
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_legend_explains_every_line_shading_and_mark(page, name):
     page.open(f".model={name}&.compare={name}&.change=1 {'k' if 'k' in declared(name) else 'm'} 1")
     page.check("envelopes", True)
-    page.run(web_page.DRAWN)
+    page.run(web_page.NEXT_PICTURE)
     legend = page.run("document.getElementById('legend').innerText")
-    drawn = page.run(
+    labels = page.run(
         "[...app.plots.values()].filter(({ figure }) => !figure.hidden).flatMap(({ panel }) => panel.content.curves)"
         ".filter(({ x }) => x.length).map(({ legend }) => legend ?? null)"
     )
     page.check("envelopes", False)
-    assert {"run", "second run", "without the changes"} <= {*drawn}
-    assert all(text in legend for text in drawn)
+    assert {"run", "second run", "without the changes"} <= {*labels}
+    assert all(text in legend for text in labels)
     assert "change of a value" in legend
     has_modes = page.run("app.library.models.get(app.state().model).contacts.length > 0")
     assert ("sticks" in legend) == has_modes
@@ -41,7 +41,7 @@ def test_friction_has_one_sign_in_diagram_arrow_and_titles(page):
     """The arrow is the friction on the body, opposing the motion; the diagram shows its negative, and both say so."""
     page.open(".model=coulomb")
     page.seek(0.1)
-    page.run(web_page.DRAWN)
+    page.run(web_page.NEXT_PICTURE)
     force, speed = page.run("['F_friction', 'v'].map(name => app.runs.main.at(name, 0.1))")
     arrow = page.run("document.querySelector('#mechanism .force').getAttribute('d')")
     length = float(re.match(r"M\S+ \S+h(\S+)m", arrow)[1])
@@ -85,13 +85,13 @@ def test_the_friction_law_is_drawn_over_the_slip_speed_with_the_point_at_the_cur
     page.open(f".model={name}&.t=0.3")
     body = page.run("app.library.models.get(app.state().model).bodies[0]")
     curves = page.run("app.plots.get('.law').panel.content.curves")
-    held = [curve for curve in curves if curve["colour"] == "stick"]
-    for curve in held:  # one vertical line
+    stick_curves = [curve for curve in curves if curve["colour"] == "stick"]
+    for curve in stick_curves:  # one vertical line
         assert max(map(abs, curve["x"])) == 0
     if name in ("coulomb", "stickslip"):  # level lines
         d = {variable: meaning.start for variable, meaning in declared(name).items()}
         force = d["f"] if name == "coulomb" else d["mu_d"] * d["m"] * d["g"]
-        assert held
+        assert stick_curves
         for curve in curves:
             if curve["colour"] == "slip":
                 assert {round(abs(value) / force, 9) for value in curve["y"]} == {1}
@@ -122,7 +122,7 @@ def test_a_rectangle_enlarges_a_diagram_and_the_times_of_all_and_a_double_click_
     page.browser.size(1280)
     page.open(".model=coulomb", anew=True)
     page.run("document.getElementById('panels').scrollIntoView({ behavior: 'instant' })")
-    whole = page.run(RANGES)
+    full_ranges = page.run(RANGES)
     left, top = page.run("(b => [b.left, b.top])(app.plots.get('x').plot.host.getBoundingClientRect())")
     start, end = (page.run(f"app.plots.get('x').plot.valuesAt({x}, {y})") for x, y in ((150, 60), (250, 90)))
     page.browser.mouse("Pressed", left + 150, top + 60)
@@ -131,8 +131,8 @@ def test_a_rectangle_enlarges_a_diagram_and_the_times_of_all_and_a_double_click_
     page.browser.mouse("Released", left + 250, top + 90, buttons=0)
     x, v, phase = page.run(RANGES)
     assert x == pytest.approx([start["x"], end["x"], end["y"], start["y"]], abs=1e-3)
-    assert v == [*x[:2], *whole[1][2:]]
-    assert phase == whole[2]
+    assert v == [*x[:2], *full_ranges[1][2:]]
+    assert phase == full_ranges[2]
     assert page.run("app.state().t") == 0  # a rectangle does not move the cursor
     page.type_number("f", "0.6")
     assert page.run(RANGES)[0] == x  # a changed run is shown in the same part
@@ -150,15 +150,15 @@ def test_keys_enlarge_a_diagram_and_escape_shows_all(page):
     key = (
         "app.plots.get('.phase').plot.host.dispatchEvent(new KeyboardEvent('keydown', {{ key: {!r}, bubbles: true }}))"
     )
-    whole = page.run(RANGES)[2]
+    full_range = page.run(RANGES)[2]
     page.run(key.format("+"))
     part = page.run(RANGES)[2]
-    assert whole[0] < part[0] < part[1] < whole[1]
+    assert full_range[0] < part[0] < part[1] < full_range[1]
     page.run(key.format("ArrowRight"))
     assert page.run(RANGES)[2][0] > part[0]
     page.run(key.format("-"))
     page.run(key.format("Escape"))
-    assert page.run(RANGES)[2] == whole
+    assert page.run(RANGES)[2] == full_range
     page.run(key.format("+"))
     page.click("#panel-\\.phase .show-all")
-    assert page.run(RANGES)[2] == whole
+    assert page.run(RANGES)[2] == full_range

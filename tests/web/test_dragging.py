@@ -38,9 +38,9 @@ def send(page, touch, kind, x, y):
     return page.browser.call("Input.dispatchTouchEvent", type=kinds[kind], touchPoints=points)
 
 
-DESKTOP, ENLARGED, PHONE = (1280, 900, 1, False), (640, 450, 2, False), (360, 740, 2, True)
-SCREENS = [*zip(MODELS, cycle((DESKTOP, ENLARGED, PHONE)), strict=False)]  # on a line, but for the pendulum
-SCREENS += [("pendulum", screen) for screen in (DESKTOP, ENLARGED, PHONE) if ("pendulum", screen) not in SCREENS]
+DESKTOP, ZOOMED_DESKTOP, PHONE = (1280, 900, 1, False), (640, 450, 2, False), (360, 740, 2, True)
+SCREENS = [*zip(MODELS, cycle((DESKTOP, ZOOMED_DESKTOP, PHONE)), strict=False)]  # on a line, but for the pendulum
+SCREENS += [("pendulum", screen) for screen in (DESKTOP, ZOOMED_DESKTOP, PHONE) if ("pendulum", screen) not in SCREENS]
 
 
 @pytest.mark.parametrize(("name", "screen"), campaign_after(3, SCREENS), ids=str)
@@ -52,17 +52,17 @@ def test_a_dragged_body_stays_under_the_pointer(page, name, screen):
     try:
         page.open(f".model={name}&.stop=2")
         page.run("document.querySelector('#mechanism').scrollIntoView({ block: 'center' })")
-        page.run(web_page.DRAWN)
+        page.run(web_page.NEXT_PICTURE)
         points = path_of_pointer(page)
         send(page, touch, "Pressed", *page.run(CENTRE))
         for x, y in points:
             send(page, touch, "Moved", x, y)
-            page.run(web_page.DRAWN)
+            page.run(web_page.NEXT_PICTURE)
             body_x, body_y = page.run(CENTRE)
             assert (body_x, body_y) == pytest.approx((x, y), abs=TOLERANCE)
-        held = page.run("app.state().t")
+        drag_time = page.run("app.state().t")
         send(page, touch, "Released", *points[-1])
-        assert held == 0
+        assert drag_time == 0
     finally:
         page.browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
         page.browser.size(1280)
@@ -77,7 +77,7 @@ def test_a_body_cannot_be_dragged_out_of_the_picture(page):
     page.browser.mouse("Pressed", x, y)
     for target in (x + 2000, x - 2000):
         page.browser.mouse("Moved", target, y)
-        page.run(web_page.DRAWN)
+        page.run(web_page.NEXT_PICTURE)
         body = page.run(box.format(".body rect"))
         assert left <= body[0] < body[1] <= right
     page.browser.mouse("Released", x, y, buttons=0)

@@ -61,6 +61,6 @@ def test_an_embedded_page_runs_without_an_address(page, tmp_path):
     page.wait("frames[0].app?.runs.done && frames[0].document.querySelector('#status').textContent")
     assert page.run("[frames[0].location.hash, frames[0].document.getElementById('link').hidden]") == ["", True]
     page.run("frames[0].document.querySelector('#to-explore').click()")  # its links lead to parts of itself
-    page.run(web_page.DRAWN)
+    page.run(web_page.NEXT_PICTURE)
     assert page.run("frames[0].app.state().model") == "coulomb"
     assert page.run("frames[0].location.href") == "about:srcdoc"

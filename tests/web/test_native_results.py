@@ -7,17 +7,17 @@ import native_fmus
 import pytest
 from models import STICKSLIP_IN_CI, declared, outputs, tunable
 
-EXACT, CLOSED = (
+EXACT, CLOSED_FORM_MODELS = (
     1e-12,
     {"smd", "coulomb", "stickslip"},
 )  # relative to the largest value, where the motion has a closed form
-STATED = 1e-5  # another math library shifts the steps of the solver, within its tolerance
-ONE = "const main = app.runs.main;"
-TIMES = f"{ONE} main.grid.map(row => main.time[row])"
-COLUMNS = f"{ONE} main.reals.map(name => main.grid.map(row => main.columns[name][row]))"
+STATED_TOLERANCE = 1e-5  # another math library shifts the steps of the solver, within its tolerance
+MAIN_RUN = "const main = app.runs.main;"
+TIMES = f"{MAIN_RUN} main.grid.map(row => main.time[row])"
+COLUMNS = f"{MAIN_RUN} main.reals.map(name => main.grid.map(row => main.columns[name][row]))"
 
 
-def some(name, seed):
+def random_values(name, seed):
     """Return values of all nonzero tunable parameters, each off by up to a factor of two, within the rules."""
     draw = random.Random(f"{name} {seed}")
     values = {v: d.start * 2 ** draw.uniform(-1, 1) for v, d in tunable(name).items() if d.start}
@@ -30,24 +30,24 @@ def some(name, seed):
 @pytest.mark.parametrize("name", STICKSLIP_IN_CI)
 def test_random_parameters_and_a_change_during_the_run_match_the_native_fmu(page, worker, name):
     for seed in range(2):
-        page.open(urlencode({".model": name, **some(name, seed)}))
+        page.open(urlencode({".model": name, **random_values(name, seed)}))
         stop = page.run("app.state().stop")
-        when, (later, factor) = stop / 3, ("k" if "k" in declared(name) else "m", 1.25)
-        was = page.run(f"app.state().values[{later!r}]")
+        when, (parameter, factor) = stop / 3, ("k" if "k" in declared(name) else "m", 1.25)
+        old_value = page.run(f"app.state().values[{parameter!r}]")
         page.seek(when)
         page.check("live", True)
-        page.type_number(later, repr(factor * was))
+        page.type_number(parameter, repr(factor * old_value))
         page.check("live", False)
         (change,) = page.run("app.state().changes")
-        assert (change["t"], change["name"]) == (when, later)
+        assert (change["t"], change["name"]) == (when, parameter)
         times, columns = page.run(f"{{ {TIMES} }}"), page.run(f"{{ {COLUMNS} }}")
         assert len(times) == 1601
         fmu = worker.instantiate(native_fmus.build_native_fmus() / f"{name}.fmu")
         fmu.begin(page.run("app.state().values"), stop=stop)
         names = [v for v in outputs(name) if declared(name)[v].type == "Real"]
-        rows = fmu.run_with_changes(sorted({*times, when}), names, {when: {later: change["value"]}})
+        rows = fmu.run_with_changes(sorted({*times, when}), names, {when: {parameter: change["value"]}})
         at = dict(zip(sorted({*times, when}), rows, strict=True))
         fmu.free()
         for actual, expected in zip(columns, zip(*(at[t] for t in times), strict=True), strict=True):
-            apart = max(abs(a - b) for t, a, b in zip(times, actual, expected, strict=True) if t != when)
-            assert apart <= (EXACT if name in CLOSED else STATED) * max(map(abs, expected))
+            error = max(abs(a - b) for t, a, b in zip(times, actual, expected, strict=True) if t != when)
+            assert error <= (EXACT if name in CLOSED_FORM_MODELS else STATED_TOLERANCE) * max(map(abs, expected))

@@ -13,8 +13,8 @@ def test_five_models_take_less_than_600_kb_and_load_nothing(page):
     assert "default-src 'none'" in text
     assert not re.findall(r"(?:src|href)\s*=\s*[\"'](?!data:|#)", text)
     page.open(anew=True)
-    refused = "fetch('data:text/plain,x').then(() => 'came', () => 'refused')"
-    assert page.run(refused) == "refused"
+    request = "fetch('data:text/plain,x').then(() => 'came', () => 'refused')"
+    assert page.run(request) == "refused"
     assert page.browser.console.pop()  # reported by the content security policy
     assert len(page.browser.console) <= 1
     page.browser.console.clear()
@@ -26,10 +26,10 @@ def test_a_model_unsuitable_for_the_page_is_reported_in_one_sentence(tmp_path):
         (("--web", "nobody"), "There is no model 'nobody'"),
         (("--web", "smd", "--law", "sign"), "smd has no friction law 'sign'"),
     ):
-        done = build(*words, "--out", str(tmp_path))
-        assert done.returncode
-        assert sentence in done.stderr
-        assert "Traceback" not in done.stderr
+        result = build(*words, "--out", str(tmp_path))
+        assert result.returncode
+        assert sentence in result.stderr
+        assert "Traceback" not in result.stderr
     assert list(tmp_path.iterdir()) == []
 
 
@@ -76,9 +76,11 @@ def test_without_scripts_the_page_shows_its_claim_and_a_text(page):
     page.browser.call("DOM.enable")
     page.browser.call("CSS.enable")
     root = page.browser.call("DOM.getDocument")["root"]["nodeId"]
-    shown = {selector: is_shown(selector) for selector in ("h1", "#no-script", "#lede", ".lane", "#explore", "main")}
+    visibility = {
+        selector: is_shown(selector) for selector in ("h1", "#no-script", "#lede", ".lane", "#explore", "main")
+    }
     page.browser.call("CSS.disable")
     page.browser.call("DOM.disable")
     page.browser.call("Emulation.setScriptExecutionDisabled", value=False)
     page.open(anew=True)
-    assert [selector for selector, value in shown.items() if value] == ["h1", "#no-script"]
+    assert [selector for selector, value in visibility.items() if value] == ["h1", "#no-script"]

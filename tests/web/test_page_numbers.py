@@ -185,7 +185,7 @@ def test_the_claims_of_the_opening_hold():
     """Title: under sign(v) the speed is never zero. Accuracy: the tolerance sets the error, the law sets the work."""
     stop = closed_form().events.t[-1]
     assert abs(stop + 0.3 - SCENE_STOP) < 0.05  # "in the 0.3 s after that"
-    found = {}
+    law_errors = {}
     for exponent in (-2, -3, -4):
         true, sign = (opening_run(law, exponent) for law in LAWS)
         assert np.all(sign["v"][1:] != 0.0)
@@ -195,10 +195,10 @@ def test_the_claims_of_the_opening_hold():
         assert np.all(true["F_friction"][at_rest] == true["F_spring"][at_rest])
         assert np.all(np.abs(sign["F_friction"][1:]) == closed_form().parameters["f"])
         assert sign.statistics.steps > 10 * true.statistics.steps
-        found[exponent] = errors(true, sign)
+        law_errors[exponent] = errors(true, sign)
     for exponent in (-3, -4):
-        assert found[exponent][1] == pytest.approx(found[exponent][0], rel=0.1)
-    assert max(found[-4]) < 0.2 * min(found[-3])
+        assert law_errors[exponent][1] == pytest.approx(law_errors[exponent][0], rel=0.1)
+    assert max(law_errors[-4]) < 0.2 * min(law_errors[-3])
     x0, band = 0.1, closed_form().parameters["f"] / closed_form().parameters["k"]
     half_swings = np.ceil((x0 - band) / (2 * band))
     expected = abs(x0 - 2 * band * half_swings)

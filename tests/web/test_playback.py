@@ -31,14 +31,14 @@ def test_pausing_keeps_the_values_in_force_and_changes_edit_those(page):
     page.wait("app.state().t > 0.1")
     page.type_number("c", "20")
     page.click("#play")
-    shown = "([field, slider]) => [Number(field.value), slider.getAttribute('aria-valuetext')]"
+    field_values = "([field, slider]) => [Number(field.value), slider.getAttribute('aria-valuetext')]"
     find = "[...document.querySelectorAll('.field:has(#field-c) input')]"
-    assert page.run(f"({shown})({find})") == [20, "20 N·s/m"]
+    assert page.run(f"({field_values})({find})") == [20, "20 N·s/m"]
     page.type_number("c", "30")
     assert page.run("[app.state().values, app.state().changes.map(({ value }) => value)]") == [{}, [30]]
     page.seek(0)
-    page.run(web_page.DRAWN)
-    assert page.run(f"({shown})({find})")[0] == declared("smd")["c"].start
+    page.run(web_page.NEXT_PICTURE)
+    assert page.run(f"({field_values})({find})")[0] == declared("smd")["c"].start
 
 
 @pytest.mark.parametrize("name", STICKSLIP_IN_CI)
@@ -106,11 +106,11 @@ def test_a_kick_is_a_push_of_finite_duration(page):
 def test_the_buttons_jump_to_the_next_and_the_previous_event(page):
     page.open(".model=coulomb")
     times = page.run("app.runs.main.events.map(({ t }) => t)")
-    seen = []
+    cursor_times = []
     for _ in times:
         page.click("#next-event")
-        seen.append(page.run("app.state().t"))
-    assert seen == times
+        cursor_times.append(page.run("app.state().t"))
+    assert cursor_times == times
     page.wait("document.getElementById('next-event').disabled")
     page.click("#previous-event")
     assert page.run("app.state().t") == times[-2]

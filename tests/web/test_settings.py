@@ -43,12 +43,12 @@ def test_a_slider_changes_the_run_and_shows_the_value_used(page):
 
 def test_the_next_frame_shows_a_changed_parameter(page):
     page.open(".model=coulomb")
-    shown = page.run(
+    values = page.run(
         "new Promise(done => { const e = document.querySelector('.field:has(#field-x0) input[type=range]');"
         "e.value = 390; e.dispatchEvent(new Event('input')); requestAnimationFrame(() =>"
         "done([app.plots.get('x').plot.content.curves.at(-1).y[0], app.state().values.x0])) })"
     )
-    assert shown[0] == shown[1] > 0.1
+    assert values[0] == values[1] > 0.1
 
 
 def test_the_last_of_two_models_chosen_at_once_is_shown(page):
@@ -78,7 +78,7 @@ SLIDE = (
 def test_a_slider_stops_where_the_model_would_refuse_its_value_and_says_why(page):
     page.open(".model=stickslip")
     alert = "document.getElementById('alert')"
-    stopped = int(page.run(SLIDE.format(400, "mu_d")))
+    stop_position = int(page.run(SLIDE.format(400, "mu_d")))
     mu_d = page.when_done("app.state().values.mu_d")
     assert 0.85 < mu_d <= 0.9
     assert float(page.run("document.getElementById('field-mu_d').value")) == mu_d
@@ -86,7 +86,7 @@ def test_a_slider_stops_where_the_model_would_refuse_its_value_and_says_why(page
     for part in ("above mu_s = 0.9", "lower mu_d or raise mu_s", f"the slider stops at mu_d = {mu_d:.4g}"):
         assert part in text
     assert page.run("app.runs.main.failure") == ""
-    assert page.run(SLIDE.format(stopped - 20, "mu_d")) == str(stopped - 20)
+    assert page.run(SLIDE.format(stop_position - 20, "mu_d")) == str(stop_position - 20)
     assert page.when_done(f"{alert}.hidden")
     page.run(SLIDE.format(0, "mu_s"))  # the other parameter of the condition stops likewise
     assert page.when_done("app.state().values.mu_s >= app.state().values.mu_d")

@@ -24,7 +24,7 @@ def press(page, selector, *keys):
     for key in keys:
         event = f"new KeyboardEvent('keydown', {{ key: {key!r}, bubbles: true }})"
         page.run(f"document.querySelector({selector!r}).dispatchEvent({event})")
-        page.run(web_page.DRAWN)
+        page.run(web_page.NEXT_PICTURE)
 
 
 def test_the_opening_claims_that_real_things_stop_and_counts_the_steps_of_both_masses(still):
@@ -47,7 +47,7 @@ def test_a_mass_under_sign_never_sticks_on_the_page(still):
     labels = "svgs => [...svgs].map(svg => /sticks|slips/.exec(svg.textContent)?.[0])"
     for t, expected in ((4.3, ["sticks", "slips"]), (0.0, ["slips", "slips"])):
         still.run(f"app.opening.seek({t})")
-        still.run(web_page.DRAWN)
+        still.run(web_page.NEXT_PICTURE)
         assert still.run(f"({labels})(document.querySelectorAll('#opening .mechanism svg'))") == expected
 
 
@@ -61,10 +61,10 @@ def test_the_opening_plays_once_at_load_and_not_under_reduced_motion(page, still
 
 def test_every_story_is_drawn_before_it_scrolls_into_view_with_a_text_and_fields(still):
     assert still.run("scrollY") == 0
-    painted = "(c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(Boolean))"
+    is_painted = "(c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(Boolean))"
     for story in STORIES:
         canvases = f"[...document.querySelectorAll('#{story} canvas[role=img]')]"
-        assert still.run(f"{canvases}.map({painted})") == [True, True]
+        assert still.run(f"{canvases}.map({is_painted})") == [True, True]
         assert still.run(f"document.querySelectorAll('#{story} .field [type=range]').length") >= 1
         assert 2 <= len(re.findall(r"[.?!](?=\s|$)", text(still, f"#{story} .text p"))) <= 7
 
@@ -83,13 +83,13 @@ def test_bodies_of_the_opening_and_the_stories_stay_under_the_pointer(still, wid
     still.run("app.stories.forEach(story => story.seek(0))")
     for section in ("opening", "stops", "squeaks"):
         still.run(f"document.querySelector('#{section} .mechanism').scrollIntoView({{ block: 'center' }})")
-        still.run(web_page.DRAWN)
+        still.run(web_page.NEXT_PICTURE)
         body = f"#{section} .body :is(rect, circle)"
         x, y = still.middle(body)
         still.browser.mouse("Pressed", x, y)
         for step in (20, -15):
             still.browser.mouse("Moved", x + step, y)
-            still.run(web_page.DRAWN)
+            still.run(web_page.NEXT_PICTURE)
             at_x, at_y = still.middle(body)
             assert at_x == pytest.approx(x + step, abs=TOLERANCE), section
             assert at_y == pytest.approx(y, abs=TOLERANCE), section

@@ -76,9 +76,11 @@ def test_user_models_run_on_a_page_of_their_own(quiet, tmp_path):
     check_table_values(page)
     page.open(".model=stacked")
     page.choose("body", 1)  # the plots of the motion come first here too
-    shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
+    shown_figures = (
+        "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
+    )
     second = page.run("app.library.models.get('stacked').bodies[1]")
-    assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
+    assert page.when_done(shown_figures) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
 
 
 def check_table_values(page):
@@ -103,6 +105,6 @@ def test_several_contacts_are_shaded_and_named_each(quiet):
         if any(band["from"] < t < band["to"] for band in sticks):
             assert abs(slip) < 1e-12
     assert set(page.run(f"{content.format('F_ext')}.curves.at(-1).y")) == {3.0}
-    named = [cells[-1] for cells in page.table("Events").values()]
-    assert named[:2] == ["F_1 slides forward", "F_2 slides forward"]
-    assert {"F_1 sticks", "F_2 sticks"} <= {*named}
+    event_texts = [cells[-1] for cells in page.table("Events").values()]
+    assert event_texts[:2] == ["F_1 slides forward", "F_2 slides forward"]
+    assert {"F_1 sticks", "F_2 sticks"} <= {*event_texts}

@@ -50,8 +50,8 @@ def value(function, *arguments):
 def test_mathematical_functions_agree_with_python(library, function):
     points = [(a,) for a in AT] if ARGUMENT_COUNTS.get(function, 1) == 1 else [(a, b) for a in AT for b in AT]
     plain = "(a) => Number.isFinite(a) ? a : String(a)"  # JSON has no other numbers
-    listed = ", ".join("[" + ", ".join(map(js, point)) + "]" for point in points)
-    results = library(f"[{listed}].map((each) => ({plain})(c.{function.__name__}(...each)))")
+    point_list = ", ".join("[" + ", ".join(map(js, point)) + "]" for point in points)
+    results = library(f"[{point_list}].map((each) => ({plain})(c.{function.__name__}(...each)))")
     for point, actual in zip(points, results, strict=True):
         expected = value(function, *point)
         if expected is None:
@@ -91,8 +91,8 @@ def test_strings_and_numbers_are_formatted_as_in_c(library, format, types, value
     folder = "place = c.malloc(100), values = c.malloc(64)"
     expected = format.replace("%lld", "%d") % values
     for room in (100, 3):
-        done = library(f"(({folder}, room = {room}) => [{', '.join(steps)}, {write}, get(place)].slice(-2))()")
-        assert done == [len(expected), expected[: room - 1]]
+        result = library(f"(({folder}, room = {room}) => [{', '.join(steps)}, {write}, get(place)].slice(-2))()")
+        assert result == [len(expected), expected[: room - 1]]
 
 
 def test_memory_is_allocated_once_and_grows_until_exhausted(library):

@@ -11,7 +11,9 @@ READY = (  # all runs of the scenes that a selector matches are done and drawn
     "new Promise(done => {{ const look = () => document.querySelector('{0}')"
     "&& !document.querySelector('{0}:not([data-ready])') ? done(true) : setTimeout(look, 1); look() }})"
 )
-DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"  # the next picture is complete
+NEXT_PICTURE = (
+    "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"  # the next picture is complete
+)
 SHIFTS = (
     "globalThis.shift = 0; new PerformanceObserver(list => { for (const entry of list.getEntries())"
     "if (!entry.hadRecentInput) shift += entry.value }).observe({ type: 'layout-shift', buffered: true })"
@@ -23,8 +25,8 @@ def build_page(*words, file="index.html"):
     pytest.importorskip("ziglang", reason="the page is compiled by the package ziglang: pip install -e '.[native]'")
 
     def make(folder):
-        done = commands.build("--web", *map(str, words), "--out", folder)
-        assert done.returncode == 0, done.stderr
+        result = commands.build("--web", *map(str, words), "--out", folder)
+        assert result.returncode == 0, result.stderr
 
     return build_cache.keep_build(build_cache.name_build("page", *words), make) / file
 
@@ -45,10 +47,10 @@ class Page:
         if anew or not expected or expected.split("#")[0] != self.file.as_uri() or expected == link:
             self.browser.open(link)
         else:
-            followed = (
+            script = (
                 "new Promise(done => { addEventListener('hashchange', done, { once: true }); location.hash = HASH })"
             )
-            self.run(followed.replace("HASH", json.dumps(hash)))
+            self.run(script.replace("HASH", json.dumps(hash)))
         return self.wait_until_drawn()
 
     def run(self, script):
