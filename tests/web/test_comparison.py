@@ -13,8 +13,8 @@ def test_a_slow_method_is_previewed_with_a_fast_one(page):
         "new Promise(done => { const e = document.querySelector('.field:has(#field-k) [type=range]');"
         "for (const at of [100, 200, 300]) { e.value = at; e.dispatchEvent(new Event('input')) }"
         "requestAnimationFrame(() => { const { main, preview } = app.runs;"
-        "const [ghost, own] = app.plots.get('x').panel.content.curves.slice(-2);"
-        "done([main.done, main.setting.values.k, preview.setting.values, ghost.x.at(-1), own.x.at(-1)]) }) })"
+        "const [first, second] = app.plots.get('x').panel.content.curves.slice(-2);"
+        "done([main.done, main.setting.values.k, preview.setting.values, first.x.at(-1), second.x.at(-1)]) }) })"
     )
     is_done, k, preview_values, preview_end, run_end = values
     assert (is_done, preview_values) == (False, {"x_m": 0.001, "k": k})

@@ -50,7 +50,9 @@ def test_a_link_shows_the_same_when_defaults_have_changed_and_names_another_vers
 def test_a_link_opened_while_the_address_is_written_is_not_lost(page):
     page.open(".model=smd")
     page.wait("location.hash.includes('stop')")
-    page.run("(own => { location.hash = '.model=coulomb'; history.replaceState(null, '', own) })(location.href)")
+    page.run(
+        "(address => { location.hash = '.model=coulomb'; history.replaceState(null, '', address) })(location.href)"
+    )
     page.wait("app.state().model === 'coulomb'")
 
 

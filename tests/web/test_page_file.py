@@ -50,7 +50,7 @@ def test_only_one_model_is_compiled_before_the_first_picture(page):
         "const { instantiate } = WebAssembly; globalThis.compiled = 0; globalThis.first = null;"
         "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all));"
         "new MutationObserver(changes => {"
-        "if (changes.some(each => each.target === document.body && each.oldValue?.includes('starting'))"
+        "if (changes.some(change => change.target === document.body && change.oldValue?.includes('starting'))"
         " && !document.body.classList.contains('starting')) first ??= compiled"
         "}).observe(document, { subtree: true, attributeFilter: ['class'], attributeOldValue: true })"
     )

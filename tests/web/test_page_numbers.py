@@ -151,7 +151,7 @@ LAWS = ("hybrid", "sign")
 
 def text(page, section):
     """Return the text of a story, with a space between two cells of a table."""
-    cells = "[...document.querySelectorAll('#{} .text :is(p, th, td)')].map(each => each.textContent).join(' ')"
+    cells = "[...document.querySelectorAll('#{} .text :is(p, th, td)')].map(element => element.textContent).join(' ')"
     return plain(page.run(cells.format(section)))
 
 
@@ -164,7 +164,7 @@ def test_each_number_of_the_opening_is_that_of_runs_of_the_fmu(still):
         if exponent != -3:
             type_number(still, "opening", "solver.rtol", f"1e{exponent}")
         assert shows(text(still, "opening"), *opening_numbers(exponent)), text(still, "opening")
-        counts = still.run("[...document.querySelectorAll('#opening .count')].map(each => each.textContent)")
+        counts = still.run("[...document.querySelectorAll('#opening .count')].map(element => element.textContent)")
         assert [int(plain(count)) for count in counts] == [opening_run(law, exponent).statistics.steps for law in LAWS]
 
 

@@ -12,7 +12,9 @@ pytestmark = pytest.mark.slow
 
 STORIES = ("stops", "chatters", "squeaks", "creeps", "swings")
 TOLERANCE = 3  # CSS pixels
-COUNTS = "[...document.querySelectorAll('#opening .count')].map(each => Number(each.textContent.replace(/\\D/g, '')))"
+COUNTS = (
+    "[...document.querySelectorAll('#opening .count')].map(element => Number(element.textContent.replace(/\\D/g, '')))"
+)
 START = "app.opening.state.values.x0"
 
 
@@ -31,7 +33,7 @@ def test_the_opening_claims_that_real_things_stop_and_counts_the_steps_of_both_m
     assert text(still, "h1") == still.run("document.title") == "Real things stop. sign(v) never does."
     true, sign = still.run(COUNTS)
     assert sign > 10 * true > 0
-    assert still.run("[...document.querySelectorAll('#opening .motion')].map(each => each.textContent)") == [
+    assert still.run("[...document.querySelectorAll('#opening .motion')].map(element => element.textContent)") == [
         "at rest",
         "slips",
     ]

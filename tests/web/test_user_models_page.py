@@ -77,7 +77,7 @@ def test_user_models_run_on_a_page_of_their_own(quiet, tmp_path):
     page.open(".model=stacked")
     page.choose("body", 1)  # the plots of the motion come first here too
     shown_figures = (
-        "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
+        "[...document.querySelectorAll('figure')].filter(figure => !figure.hidden).map(figure => figure.id).slice(0, 3)"
     )
     second = page.run("app.library.models.get('stacked').bodies[1]")
     assert page.when_done(shown_figures) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]

@@ -26,7 +26,7 @@ def library(browser):
         const view = () => new DataView(memory.buffer);
         const put = (text) => {
           const place = c.malloc(text.length + 1);
-          [...text, "\\0"].forEach((each, i) => view().setUint8(place + i, each.charCodeAt(0)));
+          [...text, "\\0"].forEach((character, i) => view().setUint8(place + i, character.charCodeAt(0)));
           return place;
         };
         const get = (place) => {
@@ -51,7 +51,7 @@ def test_mathematical_functions_agree_with_python(library, function):
     points = [(a,) for a in AT] if ARGUMENT_COUNTS.get(function, 1) == 1 else [(a, b) for a in AT for b in AT]
     plain = "(a) => Number.isFinite(a) ? a : String(a)"  # JSON has no other numbers
     point_list = ", ".join("[" + ", ".join(map(js, point)) + "]" for point in points)
-    results = library(f"[{point_list}].map((each) => ({plain})(c.{function.__name__}(...each)))")
+    results = library(f"[{point_list}].map((point) => ({plain})(c.{function.__name__}(...point)))")
     for point, actual in zip(points, results, strict=True):
         expected = value(function, *point)
         if expected is None:
