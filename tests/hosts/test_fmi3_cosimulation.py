@@ -5,7 +5,7 @@ import fmi3_fixtures
 import numpy as np
 import pytest
 import worker_client
-from models import MODELS, counts, declared, each_case, model_class, outputs
+from models import MODELS, counts, declarations_of, each_case, model_class, outputs
 from row_comparison import assert_identical
 
 from harness.references.certified_reference import POINTS, load_reference, relative_errors
@@ -68,7 +68,7 @@ def test_co_simulation_agrees_with_fmi2_bit_for_bit(process, fmus, case):
     """On the same grid, with a change of the input during the run and without a stop time."""
     name, values, stop = case
     names, times = outputs(name) + counts(name), [stop * i / 100 for i in range(101)]
-    force = next(v for v, d in declared(name).items() if d.causality == "input")
+    force = next(v for v, d in declarations_of(name).items() if d.causality == "input")
     changes = {times[30]: {force: 0.004 if name == "pendulum" else 3.0}, times[60]: {force: 0.0}}
     rows = []
     for folder in (fmus, build_cache.build_once()):

@@ -7,12 +7,12 @@ import itertools
 from math import inf, isfinite, isnan, nan
 
 import pytest
-from models import MODELS, ODE23, counts, declared, each_case, outputs, parameters, push
+from models import MODELS, ODE23, counts, declarations_of, each_case, outputs, parameters, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
 ERROR, DISCARD = 3, 2  # of messages; of a step that a Python FMU refuses
-REALS = {name: [v for v in outputs(name) if declared(name)[v].type == "Real"] for name in MODELS}
+REALS = {name: [v for v in outputs(name) if declarations_of(name)[v].type == "Real"] for name in MODELS}
 
 
 def assert_refused(fmu, t, h, *words):
@@ -57,7 +57,7 @@ def test_an_invalid_value_may_be_corrected_before_it_is_used(launch, name):
     fmu = launch(name, stop=1.0)
     force, _ = push(name)
     fmu.set({force: nan, "m": -1.0})
-    fmu.set({force: 0.0, "m": declared(name)["m"].start})
+    fmu.set({force: 0.0, "m": declarations_of(name)["m"].start})
     assert_identical(fmu.run([0.0, 0.3, 0.6], outputs(name)), expected, outputs(name))
 
 
@@ -184,10 +184,10 @@ def test_overflowing_outputs_of_a_finite_motion_are_reported(launch, name):
 
 def test_a_wrong_read_fails_without_ending_the_instance(launch):
     """It returns no plausible value and reports one error per call; all other reads and the run continue."""
-    assert next(iter(declared("stickslip"))) == "m"  # has reference 0
+    assert next(iter(declarations_of("stickslip"))) == "m"  # has reference 0
     wrong = [(kind, 0) for kind in ("Integer", "Boolean", "String")]
     wrong += [(kind, reference) for kind in ("Real", "Integer") for reference in (10**6, 2**31, 2**32 - 1)]
-    times, names = [0.0, 0.1, 0.2, 0.3], list(declared("stickslip"))
+    times, names = [0.0, 0.1, 0.2, 0.3], list(declarations_of("stickslip"))
     expected, fmu = launch("stickslip").run(times, names), launch("stickslip")
     rows = [fmu.get(*names)]
     for t, ahead in itertools.pairwise(times):
@@ -206,7 +206,7 @@ def test_a_wrong_read_fails_without_ending_the_instance(launch):
 def test_an_invalid_reference_reads_as_nan_among_valid_ones(launch):
     fmu = launch("stickslip")
     a, unknown, b = fmu.read("Real", [0, 10**6, 1])
-    assert [a, b] == fmu.get(*list(declared("stickslip"))[:2])
+    assert [a, b] == fmu.get(*list(declarations_of("stickslip"))[:2])
     assert isnan(unknown)
 
 

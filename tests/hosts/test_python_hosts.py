@@ -14,7 +14,7 @@ import pytest
 from build_cache import ROOT
 from fmpy import read_model_description
 from independent_solution import ClosedFormMotion
-from models import CASES, MODELS, declared, label, outputs
+from models import CASES, MODELS, declarations_of, label, outputs
 from row_comparison import assert_close, assert_identical
 from worker_client import Worker
 
@@ -80,8 +80,8 @@ def interpreter(version):
 
 def request(resources, name, values, stop):
     """Return the input of run_embedded.py."""
-    references = {v: i for i, v in enumerate(declared(name))}
-    real = {v: declared(name)[v].type == "Real" for v in references}
+    references = {v: i for i, v in enumerate(declarations_of(name))}
+    real = {v: declarations_of(name)[v].type == "Real" for v in references}
     return {
         "resources": str(resources / name / "resources"),
         "reals": {references[v]: x for v, x in values.items() if real[v]},
@@ -100,7 +100,7 @@ def requests(fmus, tmp_path_factory):
             archive.extractall(resources / name)
     for case in CASES:
         name, values, stop = case
-        inputs, names = request(resources, *case), [v for v in outputs(name) if declared(name)[v].type == "Real"]
+        inputs, names = request(resources, *case), [v for v in outputs(name) if declarations_of(name)[v].type == "Real"]
         fmu = worker.instantiate(fmus / f"{name}.fmu").begin(values, stop=stop)
         collected.append((inputs, [f"{label(case)}: {v}" for v in names], fmu.run(inputs["times"], names)))
         fmu.free()

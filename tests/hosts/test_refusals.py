@@ -10,7 +10,7 @@ import fmi3_fixtures
 import native_fmus
 import pytest
 import worker_client
-from models import EXACT, MODELS, SIGN, THRESHOLD, declared, outputs, parameters
+from models import EXACT, MODELS, SIGN, THRESHOLD, declarations_of, outputs, parameters
 from row_comparison import assert_identical
 from variants import slow_after
 from worker_client import FmiError
@@ -122,7 +122,7 @@ def invalid_starts():
     """Yield model, start values and words of the sentence."""
     yield from CONTRADICTIONS
     for name in MODELS:
-        for variable, declaration in declared(name).items():
+        for variable, declaration in declarations_of(name).items():
             if variable in parameters(name):
                 words = [variable, declaration.allowed]
             elif declaration.items:
@@ -136,7 +136,7 @@ def invalid_starts():
 @pytest.mark.parametrize("name", slow_after(2, MODELS))
 def test_an_invalid_start_value_is_refused_by_name_with_the_allowed_ones(instance, backend, name):
     """A Python FMU reads NaN until its first step, which is refused."""
-    reals = [v for v in outputs(name) if declared(name)[v].type == "Real"]
+    reals = [v for v in outputs(name) if declarations_of(name)[v].type == "Real"]
     for model, values, words in invalid_starts():
         if model != name:
             continue
@@ -154,7 +154,7 @@ def test_an_invalid_start_value_is_refused_by_name_with_the_allowed_ones(instanc
 
 def test_every_refused_call_leaves_a_run_as_it_was(instance, backend):
     """Before and between the steps of a run with changes of the force, all wrong calls are made."""
-    names = [name for name in declared("coulomb") if name != "solver.t_next"]
+    names = [name for name in declarations_of("coulomb") if name != "solver.t_next"]
     rows = []
     for is_disturbed in False, True:
         fmu = instance("coulomb").begin({"k": 100.0}, stop=STOP)

@@ -9,7 +9,7 @@ import fmpy
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
-from models import MODELS, declared, model_class, outputs, push
+from models import MODELS, declarations_of, model_class, outputs, push
 
 from harness.references.certified_reference import load_reference
 
@@ -305,7 +305,7 @@ def test_a_pending_event_survives_save_and_restore(unpacked, name):
             rows.append([read("mode"), read("events.count")])
             handle(fmu)
             fmu.doStep(t, 1e-3)
-            rows[-1] += [read(variable) for variable in declared(name) if variable != "solver.t_next"]
+            rows[-1] += [read(variable) for variable in declarations_of(name) if variable != "solver.t_next"]
         fmu.freeFMUState(state)
     assert rows[0] == rows[1]
     assert inf not in rows[0]

@@ -3,7 +3,7 @@
 from math import isfinite
 
 import pytest
-from models import EXACT, MODELS, SIGN, THRESHOLD, declared
+from models import EXACT, MODELS, SIGN, THRESHOLD, declarations_of
 
 from tests.model_exchange.model_exchange_client import (
     BREAKAWAY_TIME,
@@ -180,7 +180,7 @@ def test_a_value_set_since_the_last_event_restarts_the_solver(launch, name):
 @pytest.mark.parametrize(("name", "law"), [("coulomb", SIGN), ("pendulum", SIGN), ("stickslip", THRESHOLD)])
 def test_the_other_laws_have_no_event_indicators_and_no_method(launch, name, law):
     values = {"friction": law}
-    if any(value == EXACT for _, value, _ in declared(name)["solver.method"].items):
+    if any(value == EXACT for _, value, _ in declarations_of(name)["solver.method"].items):
         values["solver.method"] = EXACT
     fmu = launch(name, values)
     assert fmu.update_discrete_states() == []

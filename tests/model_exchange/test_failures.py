@@ -3,7 +3,7 @@
 from math import inf, isnan, nan
 
 import pytest
-from models import MODELS, declared, model_class, outputs, push, runtime
+from models import MODELS, declarations_of, model_class, outputs, push, runtime
 from worker_client import FmiError
 
 from fmus.compiler.lowering import model_exchange_run
@@ -23,7 +23,7 @@ def test_a_wild_trial_state_is_no_failure(launch_moving, name):
             fmu.set_point(t, trial + states[2:])
             rates, _ = fmu.rates(), fmu.indicators()
             assert not isnan(wild) or any(isnan(rate) for rate in rates)
-            fmu.get(*declared(name))
+            fmu.get(*declarations_of(name))
     fmu.set_point(nan, states)
     fmu.rates()
     fmu.indicators()

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from build_cache import ROOT
 from independent_solution import ClosedFormMotion, spans
-from models import MODELS, SIGN, declared, model_class, outputs
+from models import MODELS, SIGN, declarations_of, model_class, outputs
 from variants import slow_after
 from worker_client import FmpyError
 
@@ -41,7 +41,7 @@ def exchange(worker, path, name, **options):
     options = {
         "output_interval": stop / (POINTS - 1),
         "record_events": False,
-        "output": [*outputs(name), *(v for v in EVENTS if v in declared(name))],
+        "output": [*outputs(name), *(v for v in EVENTS if v in declarations_of(name))],
         **options,
     }
     return worker.simulate_and_count(path, "ModelExchange", **options)
@@ -122,7 +122,7 @@ def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
     interval = model_class(name).stop_time / (POINTS - 1)
     solved = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
     for variable in outputs(name):
-        if declared(name)[variable].type == "Real":
+        if declarations_of(name)[variable].type == "Real":
             actual, expected = (np.array(table[variable])[:, None] for table in (columns, solved))
             assert relative_errors(actual, expected).max() <= 20.0 * bound(name, evaluations, rtol) + 1e-6, variable
         else:
@@ -315,7 +315,7 @@ def test_an_invalid_parameter_ends_the_run_before_it_begins(worker, fmus):
         with pytest.raises(FmpyError, match="fmi3SetFloat64 failed with status 3"):
             exchange(worker, fmus / f"{name}.fmu", name, start_values={"m": -1.0})
         (line,) = worker.read_stderr().splitlines()
-        assert value_message(OUT_OF_RANGE, "m", declared(name)["m"], -1.0) in line
+        assert value_message(OUT_OF_RANGE, "m", declarations_of(name)["m"], -1.0) in line
 
 
 def test_a_successful_run_logs_nothing(worker, fmus):

@@ -2,7 +2,7 @@
 reset."""
 
 import pytest
-from models import MODELS, counts, declared, each_case, model_class, outputs, push
+from models import MODELS, counts, declarations_of, each_case, model_class, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
@@ -18,8 +18,8 @@ def test_the_states_are_position_speed_and_the_driver(launch, name):
     x, v = outputs(name)[:2]
     assert fmu.sizes() == [2 + (name in DRIVEN), 2 * (name in DRY)]
     assert fmu.get_states() == [
-        declared(name)[f"{x}0"].start,
-        declared(name)[f"{v}0"].start,
+        declarations_of(name)[f"{x}0"].start,
+        declarations_of(name)[f"{v}0"].start,
         *([0.0] * (name in DRIVEN)),
     ]
     assert fmu.nominals() == [1e-3] * fmu.sizes()[0]  # as solver.atol, in SI units
@@ -194,7 +194,7 @@ def test_three_hundred_resets_end_alike(launch_moving, name):
 
 @EVERY_MODEL
 def test_reset_restores_every_start_value(launch, name):
-    settable = {v: d.start for v, d in declared(name).items() if d.causality in ("parameter", "input")}
+    settable = {v: d.start for v, d in declarations_of(name).items() if d.causality in ("parameter", "input")}
     fmu = launch(name, {push(name)[0]: 1.0, "m": 3.0})
     fmu.update_discrete_states()
     fmu.enter_continuous_time()

@@ -2,7 +2,7 @@
 
 import pytest
 from internal_steps import components, compute_step, prepared_run, start
-from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declared, scalar_class
+from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declarations_of, scalar_class
 
 from fmus.compiler.lowering import component_name, lowered_model, model_exchange_run, sibling_module
 from fmus.runtime.codes import NO_CONSISTENT_MODES
@@ -60,9 +60,11 @@ STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  #
 @pytest.mark.parametrize("source", STUCK, ids=lambda source: getattr(source, "stem", source))
 def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
     """For any input, to the last bit: an importer would never notice it otherwise."""
-    rest = {name: 0.0 for name, d in declared(source).items() if name in ("x0", "theta0")}
+    rest = {name: 0.0 for name, d in declarations_of(source).items() if name in ("x0", "theta0")}
     model, exchange, run = externally_integrated(source, rest)
-    entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
+    entry = next(
+        name for name, d in declarations_of(source).items() if d.causality == "input" and d.unit in ("N", "N.m")
+    )
     n_contacts, n_tried = len(model.contacts), 0
     solver = run.solver
     names = [component_name("y", state) for state in model.states]
@@ -100,7 +102,7 @@ def slider(tmp_path):
 
 def test_sliding_friction_above_static_friction_is_reported_and_stops_the_run(slider):
     """In co-simulation by any method, and in model exchange."""
-    methods = [value for _, value, _ in declared(slider)["solver.method"].items]
+    methods = [value for _, value, _ in declarations_of(slider)["solver.method"].items]
     for method in methods:
         model = lowered_model(slider)()
         run = prepared_run(model, {"solver.method": method, "press": 5.0, "F_ext": 4.5})

@@ -19,7 +19,7 @@ from models import (
     MODELS,
     ODE23,
     combinations,
-    declared,
+    declarations_of,
     each_case,
     label,
     model_class,
@@ -212,7 +212,7 @@ def test_the_range_of_a_variable_is_that_of_the_values_it_accepts(description, n
     for scalar in description(name).findall("ModelVariables/ScalarVariable"):
         if scalar[0].tag != "Real" or scalar.get("causality") not in ("parameter", "input"):
             continue
-        accepts = declared(name)[scalar.get("name")].accepts
+        accepts = declarations_of(name)[scalar.get("name")].accepts
         for bound, outward in ("min", -inf), ("max", inf):
             if scalar[0].get(bound) is None:
                 assert accepts(copysign(1e300, outward))
@@ -245,13 +245,15 @@ def physics(monkeypatch):
     def equip(name, values):
         model = model_class(name)()
         patch_functions(monkeypatch)
-        for variable, d in declared(name).items():
+        for variable, d in declarations_of(name).items():
             if d.type == "Real" and d.causality in ("parameter", "input") and "." not in variable:
                 setattr(model, variable, Quantity.of(d.start or 0.1, d.unit))
         for variable, value in values.items():
             if "." not in variable:
                 setattr(model, variable, value)
-        t, x, v = (Quantity.of(0.7, unit) for unit in ("s", *(declared(name)[v].unit for v in outputs(name)[:2])))
+        t, x, v = (
+            Quantity.of(0.7, unit) for unit in ("s", *(declarations_of(name)[v].unit for v in outputs(name)[:2]))
+        )
         assert model.prepare() == 0
         model.initial_state(t)
         model.rebase(t)
@@ -276,7 +278,7 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
     for mode in (-1, 0, 1):
         modes = [mode] if model.has_dry_friction else []
         a = model.rates(t, x, v, *modes)
-        assert assert_dimension(a, Quantity.of(1.0, declared(name)[outputs(name)[2]].unit))
+        assert assert_dimension(a, Quantity.of(1.0, declarations_of(name)[outputs(name)[2]].unit))
         assert assert_dimension(a, v / t)
         assert assert_dimension(v, x / t)
         for slope, by in zip(model.jacobian(t, x, v, *modes), (t, x, v), strict=True):
@@ -292,8 +294,10 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
         with suppress(DimensionError):  # it sums up all that may overflow
             model.compute_outputs(t, x, v, *modes)
         for output in outputs(name):
-            if declared(name)[output].type == "Real":
-                assert assert_dimension(getattr(model, output), Quantity.of(1.0, declared(name)[output].unit)), output
+            if declarations_of(name)[output].type == "Real":
+                assert assert_dimension(getattr(model, output), Quantity.of(1.0, declarations_of(name)[output].unit)), (
+                    output
+                )
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -302,7 +306,7 @@ def test_the_methods_preserve_dimensions(physics, name):
     model, t, x, v = physics(name, {})
     modes = [1] if model.has_dry_friction else []
     a, h = model.rates(t, x, v, *modes), Quantity(1e-4, 0, 0, 1)
-    for file in [item for item, number, _ in declared(name)["solver.method"].items if number != EXACT]:
+    for file in [item for item, number, _ in declarations_of(name)["solver.method"].items if number != EXACT]:
         method = getattr(runtime(name, file), file.capitalize())()
         step = runtime(name, "internal_step").InternalStep(model)
         x1, v1, *rates1, e_x, e_v = method.propose(model, step, *modes, t, x, v, v, a, h)
@@ -352,7 +356,7 @@ def test_a_wrong_unit_would_be_detected(physics, name):
 
 def numbers(fmu, name):
     """Read every variable."""
-    return dict(zip(declared(name), fmu.get(*declared(name)), strict=True))
+    return dict(zip(declarations_of(name), fmu.get(*declarations_of(name)), strict=True))
 
 
 def infinite(values):
@@ -380,7 +384,7 @@ def test_a_healthy_run_has_only_finite_values(launch, case, stop):
 @EVERY_MODEL
 def test_every_variable_is_readable_in_every_phase(worker, fmus, name):
     fmu = worker.instantiate(fmus / f"{name}.fmu")
-    assert set(numbers(fmu, name)) == set(declared(name))
+    assert set(numbers(fmu, name)) == set(declarations_of(name))
     fmu.setup(0.0, 1.0, None)
     assert infinite(numbers(fmu, name)) == []
     fmu.enter()
@@ -395,12 +399,14 @@ def test_every_variable_is_readable_in_every_phase(worker, fmus, name):
     fmu.terminate()
     assert repr(numbers(fmu, name)) == repr(running)
     fmu.reset()
-    assert set(numbers(fmu, name)) == set(declared(name))
+    assert set(numbers(fmu, name)) == set(declarations_of(name))
     fmu.begin({"m": 1e-300, push(name)[0]: 1e300})  # valid values, but the run diverges
     with pytest.raises(FmiError):
         fmu.step(0.0, 0.1)
     failed = numbers(fmu, name)
-    calculated = [v for v, d in declared(name).items() if d.type == "Real" and d.causality in ("output", "local")]
+    calculated = [
+        v for v, d in declarations_of(name).items() if d.type == "Real" and d.causality in ("output", "local")
+    ]
     assert [v for v in calculated if not isnan(failed[v])] == []
     fmu.free()
 
@@ -434,7 +440,7 @@ def another(declaration):
 @EVERY_MODEL
 def test_every_settable_variable_can_be_set_individually(launch, name):
     """It reads back, before the run and, if tunable, during the run; otherwise it is refused. The run continues."""
-    for variable, d in declared(name).items():
+    for variable, d in declarations_of(name).items():
         if d.causality not in ("parameter", "input") or len(d.items) == 1:
             continue
         value = another(d)
@@ -495,7 +501,7 @@ def test_outputs_depend_on_the_input_as_declared(launch, description, name):
 @EVERY_MODEL
 def test_every_choice_has_a_description_and_a_position(name):
     """Items count from 1, or from the number of the method."""
-    for d in declared(name).values():
+    for d in declarations_of(name).values():
         if d.items:
             values = [value for _, value, _ in d.items]
             assert values == sorted(set(values))

@@ -4,7 +4,7 @@ from math import radians
 
 import pytest
 from fmpy import read_model_description
-from models import MODELS, declared, model_class
+from models import MODELS, declarations_of, model_class
 
 from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.messages import value_message
@@ -57,7 +57,7 @@ UNITS = {
 
 
 def starts(name, kind):
-    return {v: d.start for v, d in declared(name).items() if kind(d) and "." not in v and not d.items}
+    return {v: d.start for v, d in declarations_of(name).items() if kind(d) and "." not in v and not d.items}
 
 
 def test_there_are_five_models():
@@ -78,38 +78,38 @@ def test_parameters_and_inputs_have_their_names_and_defaults(name):
 
 @pytest.mark.parametrize("name", OUTPUTS)
 def test_outputs_have_their_names(name):
-    assert [v for v, d in declared(name).items() if d.causality == "output"] == OUTPUTS[name].split()
+    assert [v for v, d in declarations_of(name).items() if d.causality == "output"] == OUTPUTS[name].split()
 
 
 @pytest.mark.parametrize("name", TUNABLE)
 def test_the_solver_has_its_settings_and_counters(name):
     settings = {
         v: d.start
-        for v, d in declared(name).items()
+        for v, d in declarations_of(name).items()
         if v.startswith("solver.") and d.causality in ("parameter", "input")
     }
     default = {"pacejka": "radau9", "pendulum": "dop853"}.get(name, "exact")
     assert settings == {"solver.method": METHODS[default], "solver.rtol": 0.0, "solver.atol": 0.0, "solver.h_max": 0.0}
-    for label, value, _ in declared(name)["solver.method"].items:
+    for label, value, _ in declarations_of(name)["solver.method"].items:
         assert METHODS[label] == value
-    counts = [v for v, d in declared(name).items() if d.causality == "local"]
+    counts = [v for v, d in declarations_of(name).items() if d.causality == "local"]
     expected = "solver.steps solver.rejected solver.evaluations solver.h solver.t_next events.count events.t_last"
     assert sorted(counts) == sorted(expected.split())
 
 
 def test_each_model_offers_its_friction_laws():
-    laws = {name: declared(name)["friction"] for name in TUNABLE if "friction" in declared(name)}
+    laws = {name: declarations_of(name)["friction"] for name in TUNABLE if "friction" in declarations_of(name)}
     items = {name: [item[:2] for item in law.items] for name, law in laws.items()}
     two_laws = [("hybrid", 1), ("sign", 2)]
     assert items == {"coulomb": two_laws, "pendulum": two_laws, "stickslip": [("hybrid", 1), ("threshold", 3)]}
     assert all(law.start == 1 for law in laws.values())
-    assert [item[:2] for item in declared("pendulum")["pin_load"].items] == [("weight", 1), ("reaction", 2)]
+    assert [item[:2] for item in declarations_of("pendulum")["pin_load"].items] == [("weight", 1), ("reaction", 2)]
 
 
 @pytest.mark.parametrize("name", TUNABLE)
 def test_units_match_the_quantities(name):
-    special = {"a": "m" if name == "pendulum" else "m/s2", "solver.atol": declared(name)["solver.atol"].unit}
-    for v, d in declared(name).items():
+    special = {"a": "m" if name == "pendulum" else "m/s2", "solver.atol": declarations_of(name)["solver.atol"].unit}
+    for v, d in declarations_of(name).items():
         if d.type == "Real":
             assert d.unit == {**UNITS, **special}[v], v
         assert d.text
@@ -119,9 +119,9 @@ def test_units_match_the_quantities(name):
 
 @pytest.mark.parametrize("name", TUNABLE)
 def test_masses_are_positive_and_all_start_values_are_in_range(name):
-    assert declared(name)["m"].above == 0.0
-    assert not declared(name)["m"].accepts(0.0)
-    assert all(d.accepts(d.start) for d in declared(name).values() if d.causality in ("parameter", "input"))
+    assert declarations_of(name)["m"].above == 0.0
+    assert not declarations_of(name)["m"].accepts(0.0)
+    assert all(d.accepts(d.start) for d in declarations_of(name).values() if d.causality in ("parameter", "input"))
 
 
 def test_a_declaration_states_its_allowed_range():

@@ -12,7 +12,7 @@ import fmi3_fixtures
 import fmpy
 import pytest
 from fmi3_as_fmi2 import Slave
-from models import MODELS, ROOT, declared, model_class, outputs, push
+from models import MODELS, ROOT, declarations_of, model_class, outputs, push
 
 from fmus.compiler.lowering import lowered_model
 from fmus.packaging.dependencies import output_dependencies
@@ -43,13 +43,13 @@ def dependencies_by_name(unknowns, names):
 def at_the_start(fmus):
     """Return the initial dependencies in the description of a model."""
     return lambda name: dependencies_by_name(
-        structure(fmus / f"{name}.fmu").findall("InitialUnknowns/Unknown"), list(declared(name))
+        structure(fmus / f"{name}.fmu").findall("InitialUnknowns/Unknown"), list(declarations_of(name))
     )
 
 
 def some(name, variable, draw):
     """Return a valid value."""
-    d = declared(name)[variable]
+    d = declarations_of(name)[variable]
     if d.items:
         return draw.choice(d.items)[1]
     if d.start == 0.0 and draw.random() < 0.5:
@@ -77,7 +77,7 @@ def situation(name, knowns, draw):
 def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start, name):
     """Each known is changed alone: only the declared unknowns respond, and each of them does in some situation."""
     draw, declared_dependencies = random.Random(name), at_the_start(name)
-    knowns = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
+    knowns = [v for v, d in declarations_of(name).items() if d.causality in ("parameter", "input")]
     responses = {v: set() for v in declared_dependencies}
     fmu = worker.instantiate(fmus / f"{name}.fmu")
     for _ in range(SITUATIONS):
@@ -98,22 +98,22 @@ def test_fmi3_outputs_depend_on_exactly_the_declared_parameters_after_initialisa
     description, folder = fmpy.read_model_description(path), str(fmpy.extract(path, tmp_path))
     fmu = Slave(guid=description.guid, modelIdentifier=name, unzipDirectory=folder, instanceName=name)
     fmu.instantiate()
-    names, references = list(declared(name)), {v: i for i, v in enumerate(declared(name))}
-    knowns = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
-    changed = [v for v in knowns if declared(name)[v].variability != "fixed"]
+    names, references = list(declarations_of(name)), {v: i for i, v in enumerate(declarations_of(name))}
+    knowns = [v for v, d in declarations_of(name).items() if d.causality in ("parameter", "input")]
+    changed = [v for v in knowns if declarations_of(name)[v].variability != "fixed"]
     declared_dependencies = {
         v: {names[one] for one in (k.valueReference for k in unknown.dependencies) if names[one] in changed}
         for unknown in description.outputs
         for v in [unknown.variable.name]
     }
-    reals = [references[v] for v in declared_dependencies if declared(name)[v].type == "Real"]
-    modes = [references[v] for v in declared_dependencies if declared(name)[v].type != "Real"]
+    reals = [references[v] for v in declared_dependencies if declarations_of(name)[v].type == "Real"]
+    modes = [references[v] for v in declared_dependencies if declarations_of(name)[v].type != "Real"]
     responses = {v: set() for v in declared_dependencies}
     for _ in range(SITUATIONS):
         values = situation(name, knowns, draw)
         fmu.reset()
         for v, value in values.items():
-            (fmu.setReal if declared(name)[v].type == "Real" else fmu.setInteger)([references[v]], [value])
+            (fmu.setReal if declarations_of(name)[v].type == "Real" else fmu.setInteger)([references[v]], [value])
         fmu.setupExperiment()
         fmu.enterInitializationMode()
         before = [*fmu.getReal(reals), *fmu.getInteger(modes)]
@@ -131,7 +131,7 @@ def test_fmi3_outputs_depend_on_exactly_the_declared_parameters_after_initialisa
         fmu.freeFMUstate(state)
     fmu.freeInstance()
     for v, respond in responses.items():  # under some laws a mode responds at the next event only
-        is_real = declared(name)[v].type == "Real"
+        is_real = declarations_of(name)[v].type == "Real"
         assert respond == declared_dependencies[v] if is_real else respond <= declared_dependencies[v]
 
 
@@ -139,14 +139,16 @@ def test_fmi3_outputs_depend_on_exactly_the_declared_parameters_after_initialisa
 def test_initial_feedthrough_implies_permanent_feedthrough(fmus, at_the_start, name):
     """Two FMUs coupled by such outputs never form an algebraic loop."""
     entry = push(name)[0]
-    always = dependencies_by_name(structure(fmus / f"{name}.fmu").findall("Outputs/Unknown"), list(declared(name)))
+    always = dependencies_by_name(
+        structure(fmus / f"{name}.fmu").findall("Outputs/Unknown"), list(declarations_of(name))
+    )
     assert [v for v, knowns in at_the_start(name).items() if entry in knowns] == [v for v in always if always[v]]
 
 
 @EVERY_MODEL
 def test_fmi3_declares_the_same_and_the_driver_depends_on_its_speed(at_the_start, name):
     """The declared variables have the same positions, which FMI 3.0 counts from 0."""
-    names, dependencies = list(declared(name)), {}
+    names, dependencies = list(declarations_of(name)), {}
     for unknown in structure(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu").findall("InitialUnknown"):
         dependencies[int(unknown.get("valueReference"))] = {names[int(i)] for i in unknown.get("dependencies").split()}
     expected = {names.index(v): knowns for v, knowns in at_the_start(name).items()}

@@ -3,7 +3,7 @@
 from math import isnan
 
 import pytest
-from models import BODIES, EXACT, FEW_CASES, declared, label, outputs, push, scalar_class
+from models import BODIES, EXACT, FEW_CASES, declarations_of, label, outputs, push, scalar_class
 from worker_client import FmiError
 
 REACTION = 2  # of a pendulum whose squared load overflows much earlier: many steps, then another message
@@ -12,7 +12,7 @@ FORCES = ("k", "c", "f", "g", "mu")
 
 def force_free_values(name):
     """Return values without any force: every method would cover the motion in one step."""
-    return dict.fromkeys(set(FORCES) & declared(name).keys(), 0.0)
+    return dict.fromkeys(set(FORCES) & declarations_of(name).keys(), 0.0)
 
 
 SMOOTH = [case for case in FEW_CASES if case[1]["solver.method"] != EXACT and case[0] in BODIES]

@@ -5,7 +5,7 @@ from collections import Counter
 
 import fmi3_fixtures
 import pytest
-from models import MODELS, declared, model_class, outputs, parameters, push
+from models import MODELS, declarations_of, model_class, outputs, parameters, push
 from native_fmus import build_native_fmus
 from native_host import SANITIZERS, begin, life_cycle, read_values, run_host_script, value_references
 
@@ -27,7 +27,7 @@ def stickslip():
 
 def reals(name):
     """Return the references of the Real outputs of a model."""
-    return [value_references(name)[v] for v in outputs(name) if declared(name)[v].type == "Real"]
+    return [value_references(name)[v] for v in outputs(name) if declarations_of(name)[v].type == "Real"]
 
 
 def numbers(line):
@@ -52,7 +52,10 @@ def life(i, name):
 
 def test_the_process_has_no_python_and_agrees_with_the_python_fmu(fmu, fmus, worker):
     name = fmu.stem
-    stop, names_to_read = model_class(name).stop_time, [v for v in outputs(name) if declared(name)[v].type == "Real"]
+    stop, names_to_read = (
+        model_class(name).stop_time,
+        [v for v in outputs(name) if declarations_of(name)[v].type == "Real"],
+    )
     run = f"0 run 0 {stop} 200 {' '.join(str(value_references(name)[v]) for v in names_to_read)}"
     *answers, last = run_host_script(fmu, [*begin(0, stop=stop), "0 libraries", run])[0]
     mapped = [line for line in answers if line.startswith("mapped ")]
@@ -124,7 +127,7 @@ def failures(name):
     """Return a script that provokes every error, and recovers by reset or from a saved state."""
     ref = value_references(name)
     stop, real, count = model_class(name).stop_time, reals(name)[0], len(ref)
-    enumerations = [ref[v] for v, d in declared(name).items() if d.type == "Enumeration"]
+    enumerations = [ref[v] for v, d in declarations_of(name).items() if d.type == "Enumeration"]
     script = ["0 other", "0 new"]
     script += [
         f"0 {line}" for line in ("step 0 1", "exit", "terminate", "enter", "setup nan 0 1", "enter", "exit", "exit")

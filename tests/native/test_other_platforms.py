@@ -13,7 +13,7 @@ import build_cache
 import fmi3_fixtures
 import pytest
 from fmpy import read_model_description
-from models import CASES, HYBRID, MODELS, RADAU9, RODAS, STICKSLIP_IN_CI, declared, label, model_class, outputs
+from models import CASES, HYBRID, MODELS, RADAU9, RODAS, STICKSLIP_IN_CI, declarations_of, label, model_class, outputs
 from native_fmus import build_native_fmus, require_compiler
 from native_host import (
     HEADERS,
@@ -133,9 +133,9 @@ def run_host_script_there(machine, fmu, script):
 def runs(name):
     """Return a script with every case of a model, each in its own instance, and the number of rows of each."""
     ref, script = value_references(name), []
-    reals = " ".join(str(ref[v]) for v in outputs(name) if declared(name)[v].type == "Real")
+    reals = " ".join(str(ref[v]) for v in outputs(name) if declarations_of(name)[v].type == "Real")
     for i, (_, values, stop) in enumerate(case for case in STEADY if case[0] == name):
-        sets = [f"{i} {'seti' if declared(name)[v].items else 'setr'} {ref[v]} {x!r}" for v, x in values.items()]
+        sets = [f"{i} {'seti' if declarations_of(name)[v].items else 'setr'} {ref[v]} {x!r}" for v, x in values.items()]
         script += [f"{i} new", *sets, *begin(i, stop=stop)[1:]]
         script += [f"{i} run {stop * k / ROWS!r} {stop * (k + 1) / ROWS!r} 1 {reals}" for k in range(ROWS)]
     return script
@@ -144,9 +144,9 @@ def runs(name):
 def exchange(name):
     """Return a script with Euler steps in model exchange and an event at each step; a sled starts far behind its
     driver."""
-    ref, driven = value_references(name), "x_driver" in declared(name)
+    ref, driven = value_references(name), "x_driver" in declarations_of(name)
     states, behind = len(model_class(name).states) + driven, [(ref["x0"], -0.2)] if driven else []
-    reals = " ".join(str(ref[v]) for v in outputs(name) if declared(name)[v].type == "Real")
+    reals = " ".join(str(ref[v]) for v in outputs(name) if declarations_of(name)[v].type == "Real")
     spans = [f"0 euler {states} {k / ROWS!r} {(k + 1) / ROWS!r} 40 {reals}" for k in range(ROWS)]
     return ["0 new exchange", *begin(0, behind)[1:], *spans]
 

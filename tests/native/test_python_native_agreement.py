@@ -14,7 +14,7 @@ from math import inf, isnan, nan
 
 import pytest
 from build_cache import build_once
-from models import HYBRID, MODELS, declared, label, model_class, pairwise_cases, parameters, tunable
+from models import HYBRID, MODELS, declarations_of, label, model_class, pairwise_cases, parameters, tunable
 from native_fmus import require_compiler
 from worker_client import FmiError, Worker
 
@@ -165,7 +165,7 @@ def random_start(draw, name, choices, stop):
 
 def random_mistake(draw, name, stop):
     """Return an invalid setting, a step that reports it, and possibly a recovery."""
-    declarations = declared(name)
+    declarations = declarations_of(name)
     odd = {v: draw.choice(ODD) for v in draw.sample(list(tunable(name)), 2)}
     fixed = draw.choice([v for v, d in declarations.items() if d.variability == "fixed"])
     calculated = draw.choice([v for v, d in declarations.items() if d.causality in ("output", "local")])
@@ -230,7 +230,9 @@ def random_breakdown(draw, name, choices):
 
 def assert_agree(folders, pair, name, events):
     """Apply the events to a Python FMU and to a native one, and compare."""
-    names = [v for v in declared(name) if v != "solver.t_next"]  # which computes the next step: an event of its own
+    names = [
+        v for v in declarations_of(name) if v != "solver.t_next"
+    ]  # which computes the next step: an event of its own
     responses = [
         LifeCycle(worker, folder / f"{name}.fmu", names).live(events)
         for worker, folder in zip(pair, folders, strict=True)

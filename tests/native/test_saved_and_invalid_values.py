@@ -10,7 +10,7 @@ import fmpy
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
-from models import MODELS, declared, model_class
+from models import MODELS, declarations_of, model_class
 from native_fmus import build_native_fmus
 from native_host import compiler
 from variants import slow_after
@@ -70,7 +70,7 @@ def test_a_power_of_two_has_as_few_digits_as_in_python(unpacked, fmu, capfd, exp
 @pytest.mark.parametrize("name", slow_after(2, MODELS))
 def test_values_do_not_depend_on_the_order_in_which_a_call_reads_them(name):
     """Some are calculated only when they are read."""
-    names = [v for v, declaration in declared(name).items() if declaration.type == "Real"]
+    names = [v for v, declaration in declarations_of(name).items() if declaration.type == "Real"]
     rows = []
     with closing(Worker()) as worker:
         for order in names, names[::-1]:

@@ -7,7 +7,7 @@ import native_fmus
 import pytest
 from commands import build as command
 from fmpy import read_model_description
-from models import EXACT, FEW_CASES, MODELS, counts, declared, label, outputs
+from models import EXACT, FEW_CASES, MODELS, counts, declarations_of, label, outputs
 from row_comparison import assert_identical
 from variants import slow_after
 
@@ -23,7 +23,7 @@ def choice_options(name, values):
     """Return the choice labels of a case, by command-line option."""
     choices = {}
     for variable, option in LABELS.items():
-        for item in declared(name)[variable].items if variable in values else ():
+        for item in declarations_of(name)[variable].items if variable in values else ():
             if item[1] == values[variable]:
                 choices[option] = item[0]
     return choices
@@ -48,7 +48,7 @@ def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, c
     options = choice_options(name, values)
     description = read_model_description(path, validate_model_structure=True)
     assert {variable.name for variable in description.modelVariables} <= {
-        *declared(name)
+        *declarations_of(name)
     }  # whose characters are allowed
     assert not LABELS.keys() & {variable.name for variable in description.modelVariables}
     assert describe(path).fixed == {variable: options[word] for variable, word in LABELS.items() if word in options}

@@ -13,7 +13,7 @@ from archives import read_archive
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
-from models import ROOT, declared, model_class, scalar_class
+from models import ROOT, declarations_of, model_class, scalar_class
 from PIL import Image
 from variants import slow_after
 
@@ -107,7 +107,7 @@ def test_every_real_has_a_unit_and_every_enumeration_its_items(fmu, name):
     units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
     assert {element.get("unit") for element in root.iterfind("ModelVariables/Float64")} == units
     types = {kind.get("name"): kind for kind in root.find("TypeDefinitions")}
-    for variable, meaning in declared(name).items():
+    for variable, meaning in declarations_of(name).items():
         if meaning.items:
             element = root.find(f"ModelVariables/Enumeration[@name='{variable}']")
             items = types[element.get("declaredType")].findall("Item")

@@ -19,7 +19,7 @@ from archives import read_archive
 from build_cache import ROOT
 from commands import build as command
 from fmpy.validation import validate_fmu
-from models import declared, scalar_class
+from models import declarations_of, scalar_class
 
 from fmus.compiler import BuildError
 from fmus.compiler.embedded_modules import embedded_files, installed_package
@@ -140,7 +140,7 @@ def test_every_real_has_a_unit_and_every_angle_is_displayed_in_degrees(fmu, name
 def test_enumerations_list_their_items(fmu, name):
     root = description_of(fmu(name))
     types = {kind.get("name"): kind for kind in root.findall("TypeDefinitions/SimpleType")}
-    choices = {variable: meaning for variable, meaning in declared(name).items() if meaning.items}
+    choices = {variable: meaning for variable, meaning in declarations_of(name).items() if meaning.items}
     assert "solver.method" in choices
     for variable, meaning in choices.items():
         value = root.find(f"ModelVariables/ScalarVariable[@name='{variable}']/Enumeration")

@@ -12,7 +12,7 @@ import native_fmus
 import pytest
 from archives import read_archive
 from build_cache import ROOT
-from models import MODELS, declared, model_class, outputs
+from models import MODELS, declarations_of, model_class, outputs
 
 from fmus.packaging import archive
 from fmus.packaging.documentation_page import documentation_page, tick_values, typeset
@@ -128,7 +128,7 @@ class Reader(HTMLParser):
 def test_the_page_lists_every_variable_law_and_method(content, name):
     reader = Reader(content(name)[PAGE].decode())
     assert reader.open == []
-    for variable, d in declared(name).items():
+    for variable, d in declarations_of(name).items():
         assert variable in reader.text
         assert d.text in reader.text.lower() or d.text in reader.text
         for label, _, sentence in d.items:

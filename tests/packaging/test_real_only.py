@@ -11,7 +11,7 @@ import native_fmus
 import pytest
 from commands import build
 from fmpy import read_model_description
-from models import HYBRID, declared, outputs
+from models import HYBRID, declarations_of, outputs
 from variants import slow_after
 
 from fmus.runtime.codes import NO_VALUE
@@ -66,7 +66,7 @@ def test_the_variables_are_reals_and_have_the_same_values(folders, backend, work
     assert {variable.type for variable in description.modelVariables} == {REAL[backend]}
     assert "--real-only" not in description.description
     assert "--real-only" in read_model_description(everything).description
-    absent = {variable for variable, meaning in declared(name).items() if meaning.items}
+    absent = {variable for variable, meaning in declarations_of(name).items() if meaning.items}
     present = {variable.name for variable in description.modelVariables}
     assert present == {variable.name for variable in read_model_description(everything).modelVariables} - absent
     names = [*outputs(name), "events.count", "solver.steps", "solver.evaluations"]
@@ -110,7 +110,7 @@ def test_a_host_that_repeats_its_mistake_gets_one_message(fmus, worker):
     """Some hosts set enumerations as Reals at every step, and ignore that the step is refused."""
     fmu = worker.instantiate(fmus / "coulomb.fmu")
     fmu.begin()
-    reference = [*declared("coulomb")].index("friction")
+    reference = [*declarations_of("coulomb")].index("friction")
     for i in range(20):
         fmu.write_one("Real", reference, HYBRID)
         with pytest.raises(Exception, match="returned status 2"):

@@ -13,7 +13,7 @@ from models import (
     SIGN,
     THRESHOLD,
     counts,
-    declared,
+    declarations_of,
     each_case,
     label,
     model_class,
@@ -87,7 +87,7 @@ def test_reading_changes_nothing_at_any_time(worker, fmus, case):
     times = [stop * i / 150 for i in range(151)]
     silent, curious = (worker.instantiate(fmus / f"{name}.fmu") for _ in range(2))
     expected = silent.begin(values, stop=stop).run(times, names)
-    everything = list(declared(name))
+    everything = list(declarations_of(name))
     curious.get(*everything)
     curious.set(values)
     curious.get(*everything)

@@ -13,7 +13,7 @@ from models import (
     MODELS,
     ROOT,
     SIGN,
-    declared,
+    declarations_of,
     each_case,
     label,
     model_class,
@@ -150,7 +150,7 @@ def test_attributes_are_created_in_init_and_keep_their_type(case):
     initial = number_paths(model_class(name)(), name, set())
     for i in range(8):
         assert instance.do_step(i * stop / 8, stop / 8)
-        read(instance, *declared(name))
+        read(instance, *declarations_of(name))
         assert number_paths(instance.model, name, set()) == initial
 
 
@@ -193,7 +193,7 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
 
     monkeypatch.setattr(type(instance.model), "compute_outputs", broken)
     monkeypatch.setattr(type(instance.model), "prepare", broken)
-    instance.set_real([list(declared(name)).index("m")], [2.0])
+    instance.set_real([list(declarations_of(name)).index("m")], [2.0])
     assert instance.do_step(0.1, 0.1) is False
     assert all(isnan(value) for value in read(instance, *[v for v in outputs(name) if v != "mode"]))
     assert instance.do_step(0.1, 0.1) is False
@@ -218,7 +218,7 @@ def test_a_run_whose_initialisation_ends_twice_continues(name):
 def test_cached_reference_lists_are_bounded():
     """If an importer always reads other lists, only some readers are cached."""
     instance, draw = slave("stickslip"), random.Random(1)
-    reals = [i for i, d in enumerate(declared("stickslip").values()) if d.type == "Real"]
+    reals = [i for i, d in enumerate(declarations_of("stickslip").values()) if d.type == "Real"]
 
     def ask(times):
         for _ in range(times):

@@ -4,7 +4,7 @@ import random
 from itertools import cycle
 
 import pytest
-from models import counts, declared, each_case, label, outputs, push
+from models import counts, declarations_of, each_case, label, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
@@ -55,7 +55,7 @@ def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
 @each_case
 def test_a_state_includes_parameters_not_yet_effective(launch, case):
     name, values, stop = case
-    everything, times = list(declared(name)), [0.0, 0.1 * stop, 0.2 * stop]
+    everything, times = list(declarations_of(name)), [0.0, 0.1 * stop, 0.2 * stop]
     force, size = push(name)
     fmu = launch(name, values, stop=stop)
     fmu.run(times[:2], [])

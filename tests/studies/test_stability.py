@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from build_cache import ROOT, build_user_model
 from model_text import PULSES
-from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared
+from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declarations_of
 from spec_runs import ignore_progress
 
 import harness
@@ -51,7 +51,7 @@ def is_sampled():
 
 def defaults(name):
     """Return the values of a model, SI units."""
-    return {variable: d.start for variable, d in declared(name).items() if d.causality in ("parameter", "input")}
+    return {variable: d.start for variable, d in declarations_of(name).items() if d.causality in ("parameter", "input")}
 
 
 # ---- the reference solutions

@@ -50,7 +50,7 @@ def runtime(name, part):
 
 
 @cache
-def declared(name):
+def declarations_of(name):
     """Return name and declaration of every variable of a model, in the order of the XML.
 
     They are those of the model before it is lowered, which takes a second, with the methods that its FMU has.
@@ -65,12 +65,12 @@ def declared(name):
 
 def outputs(name):
     """Return the names of the outputs; position and speed come first."""
-    return [v for v, d in declared(name).items() if d.causality == "output"]
+    return [v for v, d in declarations_of(name).items() if d.causality == "output"]
 
 
 def parameters(name):
     """Return names and declarations of the numeric parameters and inputs (no choices)."""
-    return {v: d for v, d in declared(name).items() if d.causality in ("parameter", "input") and not d.items}
+    return {v: d for v, d in declarations_of(name).items() if d.causality in ("parameter", "input") and not d.items}
 
 
 def tunable(name):
@@ -85,7 +85,7 @@ def is_allowed(choices):
 
 def combinations(name):
     """Return every valid combination of the choices of a model, as values to set."""
-    choices = {v: d for v, d in declared(name).items() if d.items}
+    choices = {v: d for v, d in declarations_of(name).items() if d.items}
     items = [[value for _, value, _ in declaration.items] for declaration in choices.values()]
     return [
         values for values in (dict(zip(choices, row, strict=True)) for row in product(*items)) if is_allowed(values)
@@ -100,7 +100,7 @@ def experiment(name, values):
     """
     stop, method = scalar_class(name).stop_time, values["solver.method"]
     if values.get("friction", HYBRID) == HYBRID:
-        is_stiff = declared(name)["solver.method"].start in (RODAS, RADAU9)
+        is_stiff = declarations_of(name)["solver.method"].start in (RODAS, RADAU9)
         short = is_stiff and method not in (RODAS, RADAU9)
         return name, values if method == EXACT else {**values, "solver.rtol": 1e-5}, 0.4 * stop if short else stop
     return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop
@@ -135,19 +135,19 @@ FEW_CASES = cover([(case, traits(case)) for case in CASES])  # every model, law 
 def label(case):
     """Return a readable test id: the model and the labels of its choices."""
     name, values, _ = case
-    names = [item[0] for v, value in values.items() for item in declared(name)[v].items if item[1] == value]
+    names = [item[0] for v, value in values.items() for item in declarations_of(name)[v].items if item[1] == value]
     return "-".join([name, *names])
 
 
 def counts(name):
     """Return the names of the counters and of the last event time, as far as the model has them."""
     counters = ("solver.steps", "solver.rejected", "solver.evaluations", "solver.h", "events.count", "events.t_last")
-    return [v for v in declared(name) if v in counters]
+    return [v for v in declarations_of(name) if v in counters]
 
 
 def push(name):
     """Return the input of a model and a value that overcomes its friction."""
-    entry = next((v for v, d in declared(name).items() if d.causality == "input"), None)
+    entry = next((v for v, d in declarations_of(name).items() if d.causality == "input"), None)
     if entry is None:
         pytest.skip(f"{name} has no input")
     return entry, {"pendulum": 0.02}.get(name, 200.0)

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import fromstring
 import build_cache
 import fmpy
 import pytest
-from models import ROOT, declared, model_class, outputs
+from models import ROOT, declarations_of, model_class, outputs
 
 from fmus.packaging.native.binaries import STRICT
 
@@ -103,7 +103,7 @@ def run_host(program, library, fmu, script, threads=1, environment=None):
 @cache
 def value_references(name):
     """Return the value reference of every variable of a model."""
-    return {variable: index for index, variable in enumerate(declared(name))}
+    return {variable: index for index, variable in enumerate(declarations_of(name))}
 
 
 def begin(instance, values=(), stop="nan"):
@@ -119,7 +119,7 @@ def life_cycle(name, steps, exchange=False, references=None):
     In model exchange, Euler steps integrate.  `references` are those of an FMU that lacks some of the variables.
     """
     references = references or value_references(name)
-    states = len(model_class(name).states) + ("x_driver" in declared(name))
+    states = len(model_class(name).states) + ("x_driver" in declarations_of(name))
     how, (x, v, *_) = f"euler {states}" if exchange else "run", outputs(name)
     stop, read = model_class(name).stop_time, f"{references[x]} {references[v]}"
     first, second = (f"{how} {a} {b} {steps // 2} {read}" for a, b in ((0.0, 0.5 * stop), (0.5 * stop, stop)))

@@ -5,7 +5,7 @@ from math import pi, sqrt
 
 import pytest
 import web_page
-from models import MODELS, declared
+from models import MODELS, declarations_of
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -21,7 +21,7 @@ def test_the_default_run_shows_a_rest_that_begins_soon_after_the_default_stop_ti
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_legend_explains_every_line_shading_and_mark(page, name):
-    page.open(f".model={name}&.compare={name}&.change=1 {'k' if 'k' in declared(name) else 'm'} 1")
+    page.open(f".model={name}&.compare={name}&.change=1 {'k' if 'k' in declarations_of(name) else 'm'} 1")
     page.check("envelopes", True)
     page.run(web_page.NEXT_PICTURE)
     legend = page.run("document.getElementById('legend').innerText")
@@ -89,7 +89,7 @@ def test_the_friction_law_is_drawn_over_the_slip_speed_with_the_point_at_the_cur
     for curve in stick_curves:  # one vertical line
         assert max(map(abs, curve["x"])) == 0
     if name in ("coulomb", "stickslip"):  # level lines
-        d = {variable: meaning.start for variable, meaning in declared(name).items()}
+        d = {variable: meaning.start for variable, meaning in declarations_of(name).items()}
         force = d["f"] if name == "coulomb" else d["mu_d"] * d["m"] * d["g"]
         assert stick_curves
         for curve in curves:

@@ -5,7 +5,7 @@ from urllib.parse import urlencode
 
 import native_fmus
 import pytest
-from models import STICKSLIP_IN_CI, declared, outputs, tunable
+from models import STICKSLIP_IN_CI, declarations_of, outputs, tunable
 
 EXACT, CLOSED_FORM_MODELS = (
     1e-12,
@@ -32,7 +32,7 @@ def test_random_parameters_and_a_change_during_the_run_match_the_native_fmu(page
     for seed in range(2):
         page.open(urlencode({".model": name, **random_values(name, seed)}))
         stop = page.run("app.state().stop")
-        when, (parameter, factor) = stop / 3, ("k" if "k" in declared(name) else "m", 1.25)
+        when, (parameter, factor) = stop / 3, ("k" if "k" in declarations_of(name) else "m", 1.25)
         old_value = page.run(f"app.state().values[{parameter!r}]")
         page.seek(when)
         page.check("live", True)
@@ -44,7 +44,7 @@ def test_random_parameters_and_a_change_during_the_run_match_the_native_fmu(page
         assert len(times) == 1601
         fmu = worker.instantiate(native_fmus.build_native_fmus() / f"{name}.fmu")
         fmu.begin(page.run("app.state().values"), stop=stop)
-        names = [v for v in outputs(name) if declared(name)[v].type == "Real"]
+        names = [v for v in outputs(name) if declarations_of(name)[v].type == "Real"]
         rows = fmu.run_with_changes(sorted({*times, when}), names, {when: {parameter: change["value"]}})
         at = dict(zip(sorted({*times, when}), rows, strict=True))
         fmu.free()

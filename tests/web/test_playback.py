@@ -2,7 +2,7 @@
 
 import pytest
 import web_page
-from models import STICKSLIP_IN_CI, declared
+from models import STICKSLIP_IN_CI, declarations_of
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +38,7 @@ def test_pausing_keeps_the_values_in_force_and_changes_edit_those(page):
     assert page.run("[app.state().values, app.state().changes.map(({ value }) => value)]") == [{}, [30]]
     page.seek(0)
     page.run(web_page.NEXT_PICTURE)
-    assert page.run(f"({field_values})({find})")[0] == declared("smd")["c"].start
+    assert page.run(f"({field_values})({find})")[0] == declarations_of("smd")["c"].start
 
 
 @pytest.mark.parametrize("name", STICKSLIP_IN_CI)
@@ -55,7 +55,7 @@ def test_a_dragged_body_starts_where_it_is_released(page, name):
     page.browser.mouse("Released", x + 60, y, buttons=0)
     page.wait("app.state().t > 0")
     page.click("#play")
-    assert start > declared(name)[body["start"]].start
+    assert start > declarations_of(name)[body["start"]].start
     assert page.when_done(f"app.runs.main.columns[{body['position']!r}][0]") == start
 
 

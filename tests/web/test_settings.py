@@ -4,7 +4,7 @@ import re
 from math import pi, sqrt
 
 import pytest
-from models import STICKSLIP_IN_CI, declared, parameters
+from models import STICKSLIP_IN_CI, declarations_of, parameters
 
 
 @pytest.mark.parametrize("name", STICKSLIP_IN_CI)
@@ -35,7 +35,7 @@ def test_a_slider_changes_the_run_and_shows_the_value_used(page):
     mu = page.when_done("app.state().values.mu_d")
     assert 0 < mu < 0.6
     assert page.run("Number(document.getElementById('field-mu_d').value)") == mu
-    d = {name: meaning.start for name, meaning in declared("stickslip").items()}
+    d = {name: meaning.start for name, meaning in declarations_of("stickslip").items()}
     omega = sqrt(d["k"] / d["m"])
     peak = d["v_driver"] + sqrt(((d["mu_s"] - mu) * d["m"] * d["g"] / d["k"] * omega) ** 2 + d["v_driver"] ** 2)
     assert page.run("Math.max(...app.runs.main.columns.v)") == pytest.approx(peak, rel=1e-3)
