@@ -92,7 +92,7 @@ def peak_speed(run: Trajectory) -> float:
     return peak_value(run.time, speed, np.ones(len(speed), bool))
 
 
-def stuck(run: Trajectory) -> float:
+def stuck_time(run: Trajectory) -> float:
     if run.events is None:
         return np.nan
     lengths = np.diff(np.append(run.events.t, run.time[-1]))
@@ -142,7 +142,7 @@ TRAJECTORY_MEASURES = {
     "period": TrajectoryMeasure((DRIVER,), "s", "slip period", period),
     "unsteady": TrajectoryMeasure((DRIVER,), "1", SWING, unsteady),
     "peak_speed": TrajectoryMeasure((), "", "peak speed", peak_speed, role="velocity"),
-    "stuck": TrajectoryMeasure(("mode",), "s", "time stuck", stuck, modes=True),
+    "stuck": TrajectoryMeasure(("mode",), "s", "time stuck", stuck_time, modes=True),
     "rest": TrajectoryMeasure(("mode",), "", "rest position", rest, modes=True, role="position"),
     "zeta": TrajectoryMeasure(("c",), "1", "damping ratio by logarithmic decrement", zeta, decay=True),
     "f_over_k": TrajectoryMeasure(("mode",), "", ENVELOPE, f_over_k, decay=True, role="position"),
@@ -174,13 +174,13 @@ def available_measures(variables: Collection[str], is_own_fmu: bool, values: Map
 
 
 def measure_columns(
-    measures: Iterable[str], variables: Mapping[str, Any], recorded: Iterable[str]
+    measures: Iterable[str], variables: Mapping[str, Any], outputs: Iterable[str]
 ) -> tuple[MeasureColumn, ...]:
     """Return the columns of measures, for an FMU with these variables and recorded outputs."""
     columns: list[MeasureColumn] = []
     for measure in measures:
         if measure in OUTPUT_MEASURES:
-            for name in recorded:
+            for name in outputs:
                 variable = variables.get(name) or variables[name.partition("[")[0]]  # an array element
                 text = f"{variable.description or name} {OUTPUT_MEASURES[measure][1]}"
                 columns.append(MeasureColumn(f"{measure}_{name}", variable_unit(variable), text))
@@ -189,10 +189,10 @@ def measure_columns(
         elif measure in FINAL_MEASURES:
             columns.append(FINAL_MEASURES[measure][0])
         else:
-            declared = TRAJECTORY_MEASURES[measure]
-            output = find_roles(variables).get(declared.role) if not declared.unit else None
-            unit = variable_unit(variables[output]) if output else declared.unit
-            columns.append(MeasureColumn(measure, unit, declared.text))
+            trajectory_measure = TRAJECTORY_MEASURES[measure]
+            output = find_roles(variables).get(trajectory_measure.role) if not trajectory_measure.unit else None
+            unit = variable_unit(variables[output]) if output else trajectory_measure.unit
+            columns.append(MeasureColumn(measure, unit, trajectory_measure.text))
     return tuple(columns)
 
 
@@ -209,14 +209,14 @@ class SweepSpec:
     ----------
     run : RunSpec
         The run, without the varied values.
-    varied : tuple of str
+    varied_names : tuple of str
         Names of the varied parameters.
     measures : tuple of str
         Names of the measures; empty for the default ones.
     """
 
     run: RunSpec
-    varied: tuple[str, ...]
+    varied_names: tuple[str, ...]
     measures: tuple[str, ...] = ()
 
 
@@ -242,7 +242,7 @@ class OwnFmuRunner:
             start, stop = resolve_time_span(run, description)
             run = replace(run, grid=(stop - start) / N_STEPS, follow=True)
         to_read = [*outputs, *(FINAL_MEASURES[name][1] for name in ends)]
-        session = resources.enter_context(open_session(run, runs.varied, to_read))
+        session = resources.enter_context(open_session(run, runs.varied_names, to_read))
         assert isinstance(session, Session)
         self.session = session
         self.stop = self.session.grid.stop
@@ -301,7 +301,7 @@ class ExternalFmuRunner:
         outputs = tuple(name for name in default_outputs(description) if name not in texts)
         # a table of values has no place for the error of each run, so a run that misses the tolerance fails
         run = replace(runs.run, outputs=outputs, follow=True, tolerance=runs.run.rtol)
-        self.session = resources.enter_context(open_session(run, runs.varied))
+        self.session = resources.enter_context(open_session(run, runs.varied_names))
         self.columns = measure_columns(self.measures, self.variables, outputs)
         self.parameters_used: dict[str, tuple[object, str]] = {}
 
@@ -344,7 +344,7 @@ def open_runner(runs: SweepSpec) -> Iterator[Runner]:
 
 
 BUSY = Lock()  # a pythonfmu FMU must be used by one thread at a time
-LOADED: dict[str, Runner] = {}  # the runner of the current sweep, by its specification
+RUNNERS: dict[str, Runner] = {}  # the runner of the current sweep, by its specification
 RESOURCES = ExitStack()  # of this runner
 
 
@@ -370,7 +370,7 @@ class BlockResult:
 def run_block(points: np.ndarray, runs: SweepSpec) -> BlockResult:
     """Run a block, with the runner of the previous one if it belongs to the same sweep."""
     with BUSY:
-        runner = LOADED.get(repr(runs)) or load(runs)
+        runner = RUNNERS.get(repr(runs)) or load(runs)
         start = perf_counter()
         values, messages = np.full((len(points), len(runner.columns)), np.nan), {}
         for i, point in enumerate(points.tolist()):
@@ -385,12 +385,12 @@ def run_block(points: np.ndarray, runs: SweepSpec) -> BlockResult:
 def load(runs: SweepSpec) -> Runner:
     """Load the runner of another sweep and free the previous one."""
     free()
-    LOADED[repr(runs)] = runner = RESOURCES.enter_context(open_runner(runs))
+    RUNNERS[repr(runs)] = runner = RESOURCES.enter_context(open_runner(runs))
     return runner
 
 
 def free() -> None:
-    LOADED.clear()
+    RUNNERS.clear()
     RESOURCES.close()
 
 

@@ -41,7 +41,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
     if len(starts) < 2:
         raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: set a later stop")
     check_sampling(run.time, starts[: len(ends)], ends, "slip")
-    slipping = relative_speed >= 0
+    is_slipping = relative_speed >= 0
     quantities = [
         Quantity("slips", len(starts), "", "slips"),
         Quantity("first_slip", float(starts[0]), "s", first),
@@ -49,9 +49,9 @@ def analyse(run: Trajectory) -> AnalysisResult:
     ]
     if len(durations):
         quantities.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
-    quantities.append(Quantity("peak_speed", peak_value(run.time, np.abs(v), slipping), "m/s", "peak speed"))
+    quantities.append(Quantity("peak_speed", peak_value(run.time, np.abs(v), is_slipping), "m/s", "peak speed"))
     if "acceleration" in run.motion_outputs:
-        peak = peak_value(run.time, np.abs(column_of_role(run, "acceleration")), include_neighbours(slipping))
+        peak = peak_value(run.time, np.abs(column_of_role(run, "acceleration")), include_neighbours(is_slipping))
         quantities.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
     return AnalysisResult(tuple(quantities))
 
@@ -61,9 +61,9 @@ def slips_from_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.nd
 
     A slip that the end of the run cuts short has no duration.
     """
-    stuck = np.flatnonzero(mode == 0)
-    starts = t[stuck[stuck < len(t) - 1] + 1]
-    ends = t[stuck[stuck > 0]]
+    stick_phases = np.flatnonzero(mode == 0)
+    starts = t[stick_phases[stick_phases < len(t) - 1] + 1]
+    ends = t[stick_phases[stick_phases > 0]]
     ends = ends[ends > starts[0]] if len(starts) else ends
     return starts, ends - starts[: len(ends)]
 
@@ -74,21 +74,21 @@ def upward_crossings(t: np.ndarray, y: np.ndarray) -> np.ndarray:
     return t[i] - y[i] * (t[i + 1] - t[i]) / (y[i + 1] - y[i])
 
 
-def include_neighbours(selected: np.ndarray) -> np.ndarray:
+def include_neighbours(mask: np.ndarray) -> np.ndarray:
     """Extend a mask of samples (n,) by the neighbours of each selected sample."""
-    wide = selected.copy()
-    wide[:-1] |= selected[1:]
-    wide[1:] |= selected[:-1]
+    wide = mask.copy()
+    wide[:-1] |= mask[1:]
+    wide[1:] |= mask[:-1]
     return wide
 
 
-def peak_value(t: np.ndarray, y: np.ndarray, selected: np.ndarray) -> float:
+def peak_value(t: np.ndarray, y: np.ndarray, mask: np.ndarray) -> float:
     """Return the largest y (n,) of the selected samples.
 
     The peak is the vertex of the parabola through the largest sample and its neighbours if these are selected too.
     """
-    i = int(np.argmax(np.where(selected, y, -np.inf)))
-    if not (0 < i < len(y) - 1 and selected[i - 1] and selected[i + 1]):
+    i = int(np.argmax(np.where(mask, y, -np.inf)))
+    if not (0 < i < len(y) - 1 and mask[i - 1] and mask[i + 1]):
         return float(y[i])
     left, right = t[i] - t[i - 1], t[i + 1] - t[i]
     down, up = (y[i] - y[i - 1]) / left, (y[i + 1] - y[i]) / right

@@ -35,8 +35,8 @@ def step_collapse(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.ndarray)
     t, v : numpy.ndarray
         Sample times (m,) in s and velocities (m,).
     """
-    moving = np.flatnonzero(v)
-    reversals = moving[1:][np.diff(np.sign(v[moving])) != 0]
+    moving_samples = np.flatnonzero(v)
+    reversals = moving_samples[1:][np.diff(np.sign(v[moving_samples])) != 0]
     if not len(reversals):
         return None
     at = np.clip(np.searchsorted(ends, t[reversals]) - 1, 0, len(h) - 1)

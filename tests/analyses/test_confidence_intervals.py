@@ -82,7 +82,7 @@ def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
         residuals=lambda p, terms: (columns @ p[unknowns] - y, columns),
     )
     expected = np.linalg.lstsq(columns, y, rcond=None)[0]
-    assert estimate_uncertainty(problem, p, ("zeta",)).unconstrained == pytest.approx(expected, rel=1e-9)
+    assert estimate_uncertainty(problem, p, ("zeta",)).unconstrained_values == pytest.approx(expected, rel=1e-9)
     assert expected[2] < -0.2
 
 

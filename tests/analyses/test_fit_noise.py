@@ -75,7 +75,7 @@ def test_means_of_a_quantised_rest_keep_the_error_of_one_sample():
     t, step = np.linspace(0.0, 10.0, 20_001), 0.1
     moving = np.where(t > 5.0, 2.03 + 10.0 * (t - 5.0), 2.03)
     levels = np.round(moving / step) * step
-    record = MeasuredRecord(SIMULATOR, Samples("record", t, {"x": levels}), binned=True)
+    record = MeasuredRecord(SIMULATOR, Samples("record", t, {"x": levels}), is_averaged=True)
     errors = record.quantisation_errors(np.interp(record.t, t, moving)[:, None])[:, 0]
     assert record.width > 1
     assert errors[record.t < 4.9] == pytest.approx(-0.03)
@@ -85,7 +85,7 @@ def test_means_of_a_quantised_rest_keep_the_error_of_one_sample():
 
 def test_the_known_noise_of_a_sample_is_that_of_a_mean_times_the_root_of_their_number():
     t = np.linspace(0.0, 10.0, 20_001)
-    record = MeasuredRecord(SIMULATOR, Samples("record", t, {"x": np.sin(t)}, sigma={"x": 0.3}), binned=True)
+    record = MeasuredRecord(SIMULATOR, Samples("record", t, {"x": np.sin(t)}, sigma={"x": 0.3}), is_averaged=True)
     assert record.width > 1
     assert record.noise == pytest.approx(0.3 / record.width**0.5)
 
@@ -94,10 +94,10 @@ def test_inputs_pass_through_all_samples_after_their_error_has_been_estimated():
     t = np.linspace(0.0, 3.0, 49)
     force, x = np.sin(2 * np.pi * t), (1.0 - np.cos(2 * np.pi * t)) / (2 * np.pi)
     data = Samples("record", t, {"x": x}, input_t=t, inputs={"F": force}, sigma={"x": 1e-5})
-    record = MeasuredRecord(SimpleNamespace(spec=Spec(), prepare=prepare_impulse), data, binned=False)
+    record = MeasuredRecord(SimpleNamespace(spec=Spec(), prepare=prepare_impulse), data, is_averaged=False)
     problem = FitProblem([record], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
     change = subdivide_inputs(problem, np.zeros(1))
     error = np.abs(problem.residuals(np.zeros(1), problem.all)).max()  # of splines only
     assert error < np.abs(change).max() < 5 * error
     assert record.subdivision > 1
-    assert record.driven["F"][:: record.subdivision] == pytest.approx(force, abs=1e-9)
+    assert record.fine_inputs["F"][:: record.subdivision] == pytest.approx(force, abs=1e-9)

@@ -121,18 +121,18 @@ def identify(points: CurvePoints, bias: float | None = None, mass: float | None 
     points, bias = check_points(points, bias)
     points, effects, remark = leave_out_presliding(points, bias)
     effects = find_effects(points.select(find_fitting_points(points, bias, effects)), bias)
-    used = find_fitting_points(points, bias, effects)
-    fitted = points.select(used)
-    fits, unavailable = fit_laws(fitted, bias, effects)
+    is_used = find_fitting_points(points, bias, effects)
+    fitted_points = points.select(is_used)
+    fits, unavailable = fit_laws(fitted_points, bias, effects)
     fits.sort(key=lambda fit: fit.bic)
     best = fits[0]
-    widening = widen_by_neighbours(fitted, linearise(best, fitted)[0])
-    full = (fit_law(fit.law, fitted, bias, effects, True, widening) for fit in fits)
+    widening = widen_by_neighbours(fitted_points, linearise(best, fitted_points)[0])
+    full = (fit_law(fit.law, fitted_points, bias, effects, True, widening) for fit in fits)
     complete = [fit for fit in full if isinstance(fit, LawFit)]
     if points.half_step:
-        complete = widen_by_steps(complete, fitted, bias, effects)
-    corrected = replace(points, force=points.force - best.effect_force(points))
-    result = CurveIdentification(corrected, used, tuple(complete), unavailable, mass)
+        complete = widen_by_steps(complete, fitted_points, bias, effects)
+    corrected_points = replace(points, force=points.force - best.effect_force(points))
+    result = CurveIdentification(corrected_points, is_used, tuple(complete), unavailable, mass)
     return replace(result, remarks=(*remark, *find_remarks(result, widening)))
 
 
@@ -155,7 +155,7 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
     HarnessError
         If the force does not reverse with the velocity, or with the known bias.
     """
-    moving, name = points.v != 0.0, points.name
+    is_moving, name = points.v != 0.0, points.name
     for label, values, unit in (
         ("velocity", points.v, points.velocity_unit),
         ("force", points.force, points.force_unit),
@@ -163,9 +163,9 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
         if (size := float(np.abs(values).max(initial=0.0))) and not MIN_SIZE <= size <= MAX_SIZE:
             span = f"{MIN_SIZE:g} to {MAX_SIZE:g}"
             raise SceneError(f"{name}: the largest {label} is {size:.3g} {unit}, outside {span}: check its unit")
-    count = int((~moving).sum())
+    count = int((~is_moving).sum())
     notes = [f"{count} points have the velocity 0 and are left out."] if count else []
-    points = points.select(moving)
+    points = points.select(is_moving)
     v, force = points.v, points.force
     if len(v) < MIN_POINTS:
         raise SceneError(f"{name} has {len(v)} points with velocity; at least {MIN_POINTS} are required")
@@ -240,13 +240,15 @@ def find_effects(points: CurvePoints, bias: float | None) -> tuple[Effect, ...]:
         while fits := fit_laws(points, bias, effects, laws)[0]:
             best = min(fits, key=lambda fit: fit.bic)
             residuals, jacobian, _ = linearise(best, points)
-            found = find_dependences(points, residuals, jacobian, effects)
-            trials = [(fit_law(best.law, points, bias, (*effects, effect), False), effect) for effect in found]
-            scored = [(fit.bic, effect) for fit, effect in trials if isinstance(fit, LawFit) and fit.bic < best.bic]
-            if not scored or len(effects) == MAX_EFFECTS:
+            candidates = find_dependences(points, residuals, jacobian, effects)
+            trials = [(fit_law(best.law, points, bias, (*effects, effect), False), effect) for effect in candidates]
+            improvements = [
+                (fit.bic, effect) for fit, effect in trials if isinstance(fit, LawFit) and fit.bic < best.bic
+            ]
+            if not improvements or len(effects) == MAX_EFFECTS:
                 results.append((best.bic, effects))
                 break
-            effects = (*effects, min(scored)[1])
+            effects = (*effects, min(improvements)[1])
     return min(results, default=(0.0, ()))[1]
 
 
@@ -257,14 +259,14 @@ def find_fitting_points(points: CurvePoints, bias: float | None, effects: Sequen
     """
     n, best = len(points.v), (np.inf, np.ones(len(points.v), bool))
     for law in LAWS:
-        found = find_outliers(law, points, bias, effects)
-        if isinstance(found, str):
+        result = find_outliers(law, points, bias, effects)
+        if isinstance(result, str):
             continue
-        fit, used = found
+        fit, is_used = result
         count = len(fit.estimates) + OUTLIER_COST * (n - fit.points)
         criterion = float(n * np.log(fit.sum_of_squares / n) + count * np.log(n))
         if criterion < best[0]:
-            best = criterion, used
+            best = criterion, is_used
     if not np.isfinite(best[0]):
         raise HarnessError(f"{points.name}: no law can be fitted to {n} points; measure at more velocities")
     return best[1]
@@ -294,31 +296,31 @@ def widen_by_steps(
     _, level = np.unique(np.round(np.abs(points.v) / (SAME_LEVEL * points.half_step)), return_inverse=True)
     shares = np.random.default_rng(1).uniform(-1.0, 1.0, (DRAWS, int(level.max()) + 1))
     sizes = points.half_step * np.sign(points.v)
-    drawn = [fit_laws(replace(points, v=points.v + sizes * share[level]), bias, effects)[0] for share in shares]
-    best = [min(others, key=lambda other: other.bic) for others in drawn if others]
-    widened = []
+    fits_of_draws = [fit_laws(replace(points, v=points.v + sizes * share[level]), bias, effects)[0] for share in shares]
+    best = [min(others, key=lambda other: other.bic) for others in fits_of_draws if others]
+    widened_fits = []
     for fit in fits:
-        values = [other.values for others in drawn for other in others if other.name == fit.name]
+        values = [other.values for others in fits_of_draws for other in others if other.name == fit.name]
         values += [fit.values, *(other.values for other in best)]
         estimates = []
         for item in fit.estimates:
-            found = [value[item.name] for value in values if item.name in value]
-            error = float(np.hypot(item.error, np.std(found)))
-            estimates.append(replace(item, error=error, low=min(item.low, *found), high=max(item.high, *found)))
-        widened.append(replace(fit, estimates=tuple(estimates)))
-    return widened
+            sample = [value[item.name] for value in values if item.name in value]
+            error = float(np.hypot(item.error, np.std(sample)))
+            estimates.append(replace(item, error=error, low=min(item.low, *sample), high=max(item.high, *sample)))
+        widened_fits.append(replace(fit, estimates=tuple(estimates)))
+    return widened_fits
 
 
 def find_remarks(result: CurveIdentification, widening: float) -> list[str]:
     """Return the reasons to doubt a result."""
-    best, points, used = result.best, result.points, result.used
-    v = points.v[used]
+    best, points, is_used = result.best, result.points, result.used
+    v = points.v[is_used]
     remarks = [describe_effect(result, effect) for effect in best.effects]
-    outliers = np.flatnonzero(~used)
+    outliers = np.flatnonzero(~is_used)
     if len(outliers):
-        listed = ", ".join(describe_point(result, int(i)) for i in outliers[:MAX_LISTED])
+        points_text = ", ".join(describe_point(result, int(i)) for i in outliers[:MAX_LISTED])
         more = f", and {len(outliers) - MAX_LISTED} more" * (len(outliers) > MAX_LISTED)
-        remarks.append(f"{len(outliers)} of {len(points.v)} points do not fit and are left out: {listed}{more}.")
+        remarks.append(f"{len(outliers)} of {len(points.v)} points do not fit and are left out: {points_text}{more}.")
     for name in ("v_s", "v_s+", "v_s-"):
         if name in best.values and not np.isfinite(result[name].high):
             remarks.append(

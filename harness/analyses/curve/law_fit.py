@@ -22,7 +22,7 @@ import numpy as np
 from ..estimation.estimate import Estimate, student_quantile
 from .points import CurvePoints, Effect
 
-ONE = np.ones(1)
+UNIT_WEIGHT = np.ones(1)
 RESIDUE = 0.01  # of the decrease at the lowest speed: with a smaller v_s the measurement does not show the decrease
 
 
@@ -57,7 +57,7 @@ class Law:
             *(["F_v"] if self.is_viscous else []),
         )
 
-    def design(self, v: np.ndarray, v_s: np.ndarray, has_bias: bool, weights: np.ndarray = ONE) -> np.ndarray:
+    def design(self, v: np.ndarray, v_s: np.ndarray, has_bias: bool, weights: np.ndarray = UNIT_WEIGHT) -> np.ndarray:
         """Return the matrices (len(v_s), n, constants) of the law, at velocities v (n,) for each v_s.
 
         Their columns belong to the `symbols`, and to the bias.  Of velocities (k, n), the law has the mean with
@@ -359,9 +359,9 @@ def fit_law(
     if isinstance(parts, str):
         return parts
     count = sum(part.count for part in parts)
-    required = max(count + MIN_FREEDOM, int(np.ceil(MIN_POINTS_PER_CONSTANT * count)))
-    if n < required:
-        return f"with {count} constants at least {required} points are required"
+    min_points = max(count + MIN_FREEDOM, int(np.ceil(MIN_POINTS_PER_CONSTANT * count)))
+    if n < min_points:
+        return f"with {count} constants at least {min_points} points are required"
     if not all(part.is_valid for part in parts):
         return "friction does not fall with the speed"
     squares = max(sum(float(part.best.squares[0]) for part in parts), n * points.precision**2)
@@ -385,21 +385,23 @@ def with_errors(fit: LawFit, points: CurvePoints, variance: float) -> LawFit:
 def build_parts(law: Law, points: CurvePoints, effects: Sequence[Effect], known_bias: float | None) -> list[Part] | str:
     """Return the parts of a law, or the reason why the points do not suffice for it."""
     v, bias = points.v, known_bias or 0.0
-    required = MIN_SPEEDS[law.exponent] + (law.is_viscous and not law.exponent)
+    min_speeds = MIN_SPEEDS[law.exponent] + (law.is_viscous and not law.exponent)
     if law.is_symmetric:
-        if count_speeds(v) < required:
-            return f"points at {required} different speeds are required"
+        if count_speeds(v) < min_speeds:
+            return f"points at {min_speeds} different speeds are required"
         return [Part(law, points, effects, bias, 0, known_bias is None)]
     if len(set(np.sign(v))) < 2:
         return "points of both directions are required"
     if known_bias is None and not law.is_viscous:
         return "a bias in the law coulomb has the same effect"
     directions = [points.select(direction * v > 0) for direction in (1, -1)]
-    if min(count_speeds(part.v) for part in directions) < required:
-        return f"points at {required} different speeds in each direction are required"
+    if min(count_speeds(part.v) for part in directions) < min_speeds:
+        return f"points at {min_speeds} different speeds in each direction are required"
     # in one direction, a drift of the bias is one of F_c
-    own = [effect for effect in effects if effect.name != "drift of bias" or Effect("drift of F_c") not in effects]
-    return [Part(law, part, own, bias, sign, False) for part, sign in zip(directions, (1, -1), strict=True)]
+    part_effects = [
+        effect for effect in effects if effect.name != "drift of bias" or Effect("drift of F_c") not in effects
+    ]
+    return [Part(law, part, part_effects, bias, sign, False) for part, sign in zip(directions, (1, -1), strict=True)]
 
 
 def linearise(fit: LawFit, points: CurvePoints) -> tuple[np.ndarray, np.ndarray, list[str]]:

@@ -29,17 +29,17 @@ def find_outliers(
     (LawFit, numpy.ndarray) or str
         The fit, and the mask (n,) of the fitted points; or the reason why the law cannot be fitted.
     """
-    used, best = np.ones(len(points.v), bool), None
+    is_used, best = np.ones(len(points.v), bool), None
     for _ in range(MAX_FITS):
-        fit = fit_law(law, points.select(used), known_bias, effects, has_intervals=False)
+        fit = fit_law(law, points.select(is_used), known_bias, effects, has_intervals=False)
         if isinstance(fit, str):
             return fit
         residuals, jacobian, _ = linearise(fit, points)
-        best, used = (
-            (fit, used),
-            find_fitting(residuals, jacobian, float(np.abs(residuals[used]).max()) / STEP, points.precision),
+        best, is_used = (
+            (fit, is_used),
+            find_fitting(residuals, jacobian, float(np.abs(residuals[is_used]).max()) / STEP, points.precision),
         )
-        if (used == best[1]).all():
+        if (is_used == best[1]).all():
             break
     return best or "the points do not suffice"
 
@@ -50,23 +50,23 @@ def find_fitting(e: np.ndarray, jacobian: np.ndarray, smallest: float, precision
     Residuals below `smallest` are left in: a fit without the larger ones shows whether they are outliers.
     """
     n, p = jacobian.shape
-    used = best = np.ones(n, bool)
+    is_used = best = np.ones(n, bool)
     scale = np.linalg.norm(jacobian, axis=0) + 1e-300
     for _ in range(int(MAX_SHARE * n)):
-        freedom = int(used.sum()) - p
+        freedom = int(is_used.sum()) - p
         if freedom <= MIN_FREEDOM:
             break
-        q, _ = np.linalg.qr(jacobian[used] / scale)
-        residuals = e[used] - q @ (q.T @ e[used])
+        q, _ = np.linalg.qr(jacobian[is_used] / scale)
+        residuals = e[is_used] - q @ (q.T @ e[is_used])
         drops = residuals**2 / np.maximum(1 - (q**2).sum(axis=1), MIN_WEIGHT)
         worst = int(np.argmax(drops))
         # the drop of the sum of squares by a point is an F-distributed multiple of the remaining variance
         variance = max(float(residuals @ residuals - drops[worst]) / (freedom - 1), precision**2)
-        used = used.copy()
-        used[np.flatnonzero(used)[worst]] = False
+        is_used = is_used.copy()
+        is_used[np.flatnonzero(is_used)[worst]] = False
         deviation = float(np.sqrt(drops[worst] / (variance + 1e-300)))
-        if 2 * special.stdtr(freedom - 1, -deviation) * (used.sum() + 1) < SIGNIFICANCE:
-            best = used
+        if 2 * special.stdtr(freedom - 1, -deviation) * (is_used.sum() + 1) < SIGNIFICANCE:
+            best = is_used
         if deviation < SMALL or drops[worst] < smallest**2:
             break
     return best

@@ -76,8 +76,8 @@ def build_points(record: Samples, mass: float | None, backlash: float) -> CurveP
     blocks = build_blocks(record, MAX_BLOCKS)
     offset, rest, half_step, notes = find_standstill(record, blocks, units[0])
     blocks = replace(blocks, v=blocks.v - offset, rest=rest)
-    travelled = find_travel(blocks)
-    is_usable = travelled > backlash
+    travel = find_travel(blocks)
+    is_usable = travel > backlash
     if is_usable.sum() < MIN_POINTS:
         raise SceneError(f"{record.name} has too little motion: the speed is below {blocks.slowest:.3g}")
     plateaus = find_plateaus(blocks, is_usable)
@@ -144,7 +144,7 @@ def find_standstill(record: Samples, blocks: Blocks, unit: str) -> tuple[float, 
         runs = [run for run in visits if abs(float(np.median(v[run])) - at * width) <= 1.5 * width]
         forces = [float(np.median(force[run])) for run in runs]
         if len(runs) >= MIN_RESTS and np.ptp(forces) > REST_FORCES * np.ptp(force):
-            best = max(best, (sum(map(len, runs)), np.concatenate(runs)), key=lambda found: found[0])
+            best = max(best, (sum(map(len, runs)), np.concatenate(runs)), key=lambda candidate: candidate[0])
     members = best[1]
     offset = float(np.median(v[members])) if len(members) else 0.0
     if abs(offset) <= width / NOISE_BAND:
@@ -162,14 +162,14 @@ def find_travel(blocks: Blocks) -> np.ndarray:
     moves = (sign != 0) & ~reverses & ~np.append(False, reverses[:-1])
     steps = np.diff(blocks.t, prepend=blocks.t[0]) * blocks.v
     starts_at_rest = abs(blocks.v[0]) < SLOW_START * np.abs(blocks.v).max()
-    direction, distance, travelled = 0.0, 0.0 if starts_at_rest else np.inf, np.zeros(len(blocks.v))
+    direction, distance, travel = 0.0, 0.0 if starts_at_rest else np.inf, np.zeros(len(blocks.v))
     for i in np.flatnonzero(sign):
         if sign[i] == -direction:
             distance = 0.0
         direction = float(sign[i])
         distance += abs(steps[i])
-        travelled[i] = distance if moves[i] else 0.0
-    return travelled
+        travel[i] = distance if moves[i] else 0.0
+    return travel
 
 
 def find_plateaus(blocks: Blocks, is_usable: np.ndarray) -> list[np.ndarray]:
@@ -179,14 +179,14 @@ def find_plateaus(blocks: Blocks, is_usable: np.ndarray) -> list[np.ndarray]:
         if not is_usable[i]:
             i += 1
             continue
-        members, mean, skipped, j = [i], v[i], 0, i + 1
-        while j < len(v) and is_usable[j] and skipped <= MAX_SKIPPED:
+        members, mean, n_skipped, j = [i], v[i], 0, i + 1
+        while j < len(v) and is_usable[j] and n_skipped <= MAX_SKIPPED:
             if abs(v[j] - mean) <= max(BAND * abs(mean), NOISE_BAND * blocks.noise):
                 members.append(j)
                 mean += (v[j] - mean) / len(members)
-                skipped = 0
+                n_skipped = 0
             else:
-                skipped += 1
+                n_skipped += 1
             j += 1
         plateau = np.array(members)
         if len(plateau) >= MIN_BLOCKS and is_constant(blocks, plateau):
@@ -221,8 +221,8 @@ def leave_out_settling(blocks: Blocks, plateau: np.ndarray) -> np.ndarray:
     later = force[len(force) // 2 :]
     median = float(np.median(later))
     band = NOISE_BAND * robust_std(later - median)
-    settled = np.flatnonzero(np.abs(force[: len(force) // 2] - median) <= band)
-    return plateau[settled[0] if len(settled) else len(force) // 2 :]
+    settled_blocks = np.flatnonzero(np.abs(force[: len(force) // 2] - median) <= band)
+    return plateau[settled_blocks[0] if len(settled_blocks) else len(force) // 2 :]
 
 
 def average_plateaus(
@@ -240,16 +240,16 @@ def average_plateaus(
 
 def average_sweep(blocks: Blocks, backlash: float, mass: float, name: str, units: tuple[str, str]) -> CurvePoints:
     """Return the means of neighbouring blocks of a sweep, with their times as a label."""
-    travelled = find_travel(blocks)
-    is_usable = travelled > backlash
+    travel = find_travel(blocks)
+    is_usable = travel > backlash
     size = max(-(-int(is_usable.sum()) // SWEEP_POINTS), 1)
     ends = np.flatnonzero(np.diff(is_usable) | (np.diff(np.sign(blocks.v)) != 0)) + 1
     runs = [run for run in np.split(np.arange(len(blocks.t)), ends) if is_usable[run[0]]]
     parts = [part for run in runs for part in np.array_split(run, -(-len(run) // size))]
     friction = blocks.force - mass * blocks.a
-    values = (blocks.t - blocks.t.mean(), blocks.v, friction, blocks.a, np.gradient(friction, blocks.t), travelled)
-    elapsed, v, force, a, slope, travelled = (np.array([value[part].mean() for part in parts]) for value in values)
+    values = (blocks.t - blocks.t.mean(), blocks.v, friction, blocks.a, np.gradient(friction, blocks.t), travel)
+    elapsed, v, force, a, slope, travel = (np.array([value[part].mean() for part in parts]) for value in values)
     step = float(np.median(np.diff(blocks.t)))
     span = np.minimum(np.abs(a) * step * [len(part) / 2 for part in parts], np.abs(v))
     labels = tuple(f"{blocks.t[part[0]]:.4g} to {blocks.t[part[-1]]:.4g} s" for part in parts)
-    return CurvePoints(name, v, force, *units, labels, (), elapsed, span, a, slope, travelled)
+    return CurvePoints(name, v, force, *units, labels, (), elapsed, span, a, slope, travel)

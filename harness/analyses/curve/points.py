@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-ABSORBED = 0.02  # share of the power of a column: a dependence with less left by the law cannot be separated from it
+MIN_POWER = 0.02  # share of the power of a column: a dependence with less left by the law cannot be separated from it
 SCORE = 5.0  # standard deviations of a dependence beyond chance
 PRESLIDING = np.geomspace(1e-4, 1e-2, 9)  # distances over the stroke
 ROUNDOFF, SWEEP_PRECISION = 1e-12, 1e-4  # relative to the largest force
@@ -125,7 +125,7 @@ class CurvePoints:
 
 
 def find_dependences(
-    points: CurvePoints, residuals: np.ndarray, jacobian: np.ndarray, chosen: Sequence[Effect]
+    points: CurvePoints, residuals: np.ndarray, jacobian: np.ndarray, fitted_effects: Sequence[Effect]
 ) -> list[Effect]:
     """Return the effects on which residuals depend beyond chance.
 
@@ -133,16 +133,16 @@ def find_dependences(
     of its force that the derivatives (n, p) of the law do not absorb.
     """
     q, _ = np.linalg.qr(jacobian / (np.linalg.norm(jacobian, axis=0) + 1e-300))
-    squares, found = float(residuals @ residuals), []
+    squares, dependences = float(residuals @ residuals), []
     freedom = max(len(residuals) - jacobian.shape[1] - 1, 1)
     for effect in points.find_effects():
         column = points.column(effect)
-        own = column - q @ (q.T @ column)
-        power, gain = float(own @ own), float(own @ residuals)
-        if power <= ABSORBED * float(column @ column) or effect.name in [other.name for other in chosen]:
+        remainder = column - q @ (q.T @ column)
+        power, gain = float(remainder @ remainder), float(remainder @ residuals)
+        if power <= MIN_POWER * float(column @ column) or effect.name in [other.name for other in fitted_effects]:
             continue
         rest = max(squares - gain**2 / power, len(residuals) * points.precision**2)
         score = gain / float(np.sqrt(power * rest / freedom + 1e-300))
         if score > SCORE or (score < -SCORE and not effect.is_positive):
-            found.append(effect)
-    return found
+            dependences.append(effect)
+    return dependences

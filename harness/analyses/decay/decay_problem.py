@@ -132,7 +132,7 @@ class DecayProblem:
 
     def exceeds_noise(self, cost: float) -> bool:
         """Return whether a sum of squares is larger than noise explains."""
-        return cost > len(self.t) * (thresholds.UNEXPLAINED * self.noise) ** 2
+        return cost > len(self.t) * (thresholds.UNEXPLAINED_RATIO * self.noise) ** 2
 
     def half_cycles(self, p: np.ndarray, max_count: int = MAX_HALF_CYCLES) -> tuple[np.ndarray, np.ndarray]:
         """Return amplitudes and start times (N + 1,), in s, of the half cycles up to the end of the samples."""
@@ -217,8 +217,10 @@ def fit_numbered_extrema(
     def residuals(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at, x, jacobian = model.predict_extrema(p, unknowns, len(times))
         is_reached = np.isfinite(at)
-        in_time = np.where(is_reached, (np.where(is_reached, at, 0.0) - times) * weights, thresholds.UNREACHED)
-        in_position = np.where(is_reached, (np.where(is_reached, x, 0.0) - positions) / error, thresholds.UNREACHED)
+        in_time = np.where(is_reached, (np.where(is_reached, at, 0.0) - times) * weights, thresholds.UNREACHED_RESIDUAL)
+        in_position = np.where(
+            is_reached, (np.where(is_reached, x, 0.0) - positions) / error, thresholds.UNREACHED_RESIDUAL
+        )
         slopes = (
             np.where(is_reached[None, :, None], jacobian, 0.0)
             * np.stack([weights, np.full_like(weights, 1 / error)])[..., None]
@@ -274,14 +276,14 @@ def least_squares(
         Their k + 1 rows are faster to decompose; einsum needs no threads for them, unlike BLAS.  scipy refuses a step
         to values that are not finite.
         """
-        q, refused = p.copy(), np.full((len(unknowns) + 1, len(unknowns)), np.nan)
+        q, nan_jacobian = p.copy(), np.full((len(unknowns) + 1, len(unknowns)), np.nan)
         q[unknowns] = np.frombuffer(values)
         if not (np.array_equal(q, p) or is_admissible(q, p)):  # before its cost, which may be large
-            return refused[:, 0], refused, 0
+            return nan_jacobian[:, 0], nan_jacobian, 0
         r, jacobian = residual(q)
         rows = np.column_stack([jacobian, r])
         if not jacobian.any() or not np.isfinite(rows).all():
-            return refused[:, 0], refused, len(r)
+            return nan_jacobian[:, 0], nan_jacobian, len(r)
         scale = column_norms(rows)
         sizes, axes = np.linalg.eigh(np.einsum("ij,ik->jk", rows / scale, rows / scale))
         root = np.sqrt(np.maximum(sizes, 0.0))[:, None] * axes.T * scale

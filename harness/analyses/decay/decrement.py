@@ -132,10 +132,10 @@ def is_turning_point(sign: np.ndarray, i: int) -> bool:
     before = sign[i - 1] if i else 0.0
     if i and before == 0:
         return False  # the rest began earlier
-    moving = np.flatnonzero(sign[i + 1 :])
-    if not len(moving):
+    moving_samples = np.flatnonzero(sign[i + 1 :])
+    if not len(moving_samples):
         return bool(i)
-    return sign[i + 1 + moving[0]] != before and (i > 0 or moving[0] == 0)
+    return sign[i + 1 + moving_samples[0]] != before and (i > 0 or moving_samples[0] == 0)
 
 
 def locate_zero_slope(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.ndarray) -> np.ndarray:
@@ -148,8 +148,9 @@ def locate_zero_slope(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.nd
     root = np.sqrt(np.maximum(b * b - c * v0, 0.0))
     q = np.where(b > 0, -(b + root), -(b - root))
     with np.errstate(divide="ignore", invalid="ignore"):
-        one, other = np.where(q == 0, 0.5, v0 / q), np.where(c == 0, 2.0, q / c)
-    return np.where(abs(one - 0.5) <= abs(other - 0.5), one, other)  # opposite end slopes: exactly one root is inside
+        first_root, second_root = np.where(q == 0, 0.5, v0 / q), np.where(c == 0, 2.0, q / c)
+    # opposite end slopes: exactly one root is inside
+    return np.where(abs(first_root - 0.5) <= abs(second_root - 0.5), first_root, second_root)
 
 
 def select_cycles(
@@ -159,9 +160,9 @@ def select_cycles(
     begin = 2 * first
     end = len(times) - 1 if cycles is None else begin + round(2 * cycles)
     if end >= len(times) or end <= begin:
-        required = max(end, begin + 1) + 1
+        count = max(end, begin + 1) + 1
         raise HarnessError(
-            f"the decay needs {required} turning points, and the run has {len(times)}: set a later stop, a finer grid "
+            f"the decay needs {count} turning points, and the run has {len(times)}: set a later stop, a finer grid "
             "or fewer cycles"
         )
     return times[begin : end + 1], positions[begin : end + 1], (end - begin) / 2

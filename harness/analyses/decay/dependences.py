@@ -62,15 +62,15 @@ def find_dependences(problem: DecayProblem, p: np.ndarray, terms: Terms) -> Depe
     free = orthonormal(jacobian[:, (unknowns < ZETA) | (p[unknowns] > 0)])  # without losses at their bounds
     while effects:
         basis = orthonormal(columns)
-        found = {
+        candidates = {
             name: effect_variance(effect, e, free if name == "speed" else basis, width)
             for name, effect in effects.items()
         }
-        if not sizes and max(gain for _, gain in found.values()) < thresholds.PROVEN:
+        if not sizes and max(gain for _, gain in candidates.values()) < thresholds.MIN_GAIN:
             # a loss at its bound hides no departure that only its negative value would follow
-            found = {name: effect_variance(effect, e, free, width) for name, effect in effects.items()}
-        name, (variance, gain) = max(found.items(), key=lambda item: item[1][1])
-        if gain < thresholds.PROVEN:
+            candidates = {name: effect_variance(effect, e, free, width) for name, effect in effects.items()}
+        name, (variance, gain) = max(candidates.items(), key=lambda item: item[1][1])
+        if gain < thresholds.MIN_GAIN:
             break
         effect = effects.pop(name)
         effects.pop("speed", None)  # it follows what any other cause leaves, so that it counts as the first one only
@@ -88,7 +88,7 @@ def quarter_width(problem: DecayProblem, p: np.ndarray) -> int:
 def orthonormal(columns: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis (n, r) of the columns (n, k)."""
     axes, size, _ = np.linalg.svd(columns / column_norms(columns), full_matrices=False)
-    return np.asarray(axes[:, size > thresholds.SEEN * size[0]])
+    return np.asarray(axes[:, size > thresholds.RANK_RTOL * size[0]])
 
 
 def noise_variance(e: np.ndarray, width: int, freedom: int) -> float:
@@ -121,10 +121,10 @@ def effect_variance(effect: np.ndarray, e: np.ndarray, basis: np.ndarray, width:
 
     The part of an effect in the basis (n, k) is that of the unknowns, or of effects before.
     """
-    seen, e = (values - basis @ (basis.T @ values) for values in (effect, e))
-    size, axes = np.linalg.eigh(seen.T @ seen)
-    is_seen = size > thresholds.SEEN * max(size.max(), float(np.sum(effect**2)))
-    size, axes = size[is_seen], seen @ axes[:, is_seen]
+    remainder, e = (values - basis @ (basis.T @ values) for values in (effect, e))
+    size, axes = np.linalg.eigh(remainder.T @ remainder)
+    is_seen = size > thresholds.RANK_RTOL * max(size.max(), float(np.sum(effect**2)))
+    size, axes = size[is_seen], remainder @ axes[:, is_seen]
     scores = axes.T @ e
     noise = noise_variance(e - axes @ (scores / size), width, len(e) - basis.shape[1] - len(size))
     if not is_seen.any() or not noise > 0:
@@ -149,6 +149,6 @@ def speed_effects(problem: DecayProblem, p: np.ndarray, terms: Terms, jacobian: 
     share = 0.5 * np.trapezoid(np.exp(-u * np.sin(phi)) * np.sin(phi), phi, axis=-1)
     middle = (amplitudes[:-1] + amplitudes[1:]) / 2
     force = np.sinc(middle / np.pi) if is_pendulum else np.ones_like(middle)  # sin a/a
-    lost = 2 * share / force[:, None] / sensitivity
-    total = np.concatenate([np.zeros((1, len(speeds))), -np.cumsum(lost, axis=0)])
+    losses = 2 * share / force[:, None] / sensitivity
+    total = np.concatenate([np.zeros((1, len(speeds))), -np.cumsum(losses, axis=0)])
     return np.stack([slope * np.interp(problem.t, starts, column) for column in total.T], axis=1)

@@ -103,7 +103,7 @@ def make_estimates(
     """
     estimates: dict[int, Estimate] = {}
     at_bound = any(full.p[UNKNOWNS.index(term)] <= 0 for term in full.terms)  # elsewhere the bounds have no effect
-    center = uncertainty.unconstrained if at_bound else full.p[uncertainty.unknowns]
+    center = uncertainty.unconstrained_values if at_bound else full.p[uncertainty.unknowns]
     intervals = {
         int(unknown): confidence_interval(
             i,

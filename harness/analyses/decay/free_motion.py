@@ -109,13 +109,13 @@ def skip_before_start(motion: FreeMotion) -> FreeMotion:
     """Leave out the samples before the start of the motion, or before a gap near its beginning."""
     problem, segment_start = motion.problem, motion.extrema.segment_start
     start = max(segment_start - problem.time_origin, motion.p[T0])
-    released = problem.subset(problem.t >= start)
+    part = problem.subset(problem.t >= start)
     if segment_start > motion.record.t[0]:
         motion = motion.add_note(
             f"The record before the gap that ends at t = {motion.record.format_time(segment_start)} s has too few "
             "cycles and is left out."
         )
-    return replace(motion, available=released, problem=released)
+    return replace(motion, available=part, problem=part)
 
 
 def fit_certain_samples(motion: FreeMotion) -> FreeMotion:
@@ -169,19 +169,19 @@ def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
     expected = max(problem.noise, problem.residual_floor)
     if 3 <= is_first.sum() < len(e):
         rest = max(expected, float(np.sqrt(np.mean(e[~is_first] ** 2))))
-        is_disturbed = bool(np.sqrt(np.mean(e[is_first] ** 2)) > thresholds.DISTURBED * rest)
+        is_disturbed = bool(np.sqrt(np.mean(e[is_first] ** 2)) > thresholds.DISTURBANCE_RATIO * rest)
     else:
         is_disturbed = False
-    if not is_disturbed and mean_square <= (thresholds.DISTURBED * expected) ** 2:
+    if not is_disturbed and mean_square <= (thresholds.DISTURBANCE_RATIO * expected) ** 2:
         return motion
     for count in (1, 2):
         if len(extrema.t) < thresholds.MIN_UNDISTURBED + count:
             break
         later, p = problem.skip_half_cycles(motion.p, count)
         later = later.subset(later.t >= p[T0])
-        undisturbed = remove_outliers(truncate_at_stop(replace(motion.search(later, p), available=later)))
-        if undisturbed.sum_of_squares / len(undisturbed.problem.t) < thresholds.BETTER_START * mean_square:
-            return replace(undisturbed, extrema=extrema.skip(count)).add_note(
+        later_motion = remove_outliers(truncate_at_stop(replace(motion.search(later, p), available=later)))
+        if later_motion.sum_of_squares / len(later_motion.problem.t) < thresholds.BETTER_START * mean_square:
+            return replace(later_motion, extrema=extrema.skip(count)).add_note(
                 f"The motion is free from t = {motion.format_time(later.t[0])} s on; earlier samples are left out."
             )
     return motion
@@ -191,7 +191,7 @@ def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
     """Select the samples before the time at which the record departs from the law, if it does."""
     selection, extrema, terms = motion.problem, motion.extrema, motion.terms
     rms = float(np.sqrt(motion.sum_of_squares / len(selection.t)))
-    if rms <= thresholds.DISTURBED * selection.noise:
+    if rms <= thresholds.DISTURBANCE_RATIO * selection.noise:
         return motion
     start, rms = selection.t[0] + selection.time_origin, rms * selection.scale
     for share in thresholds.UNDISTURBED_PARTS:
@@ -224,7 +224,9 @@ def extend_to_departure(motion: FreeMotion, last: float) -> tuple[FreeMotion, fl
         noise, _ = estimate_noise(early.t, early.x)  # may be less than after the disturbance
         motion = replace(motion.fit(replace(early, noise=max(noise, early.noise))), problem=early)
         level = max(noise, early.noise, robust_std(motion.residuals()))
-        departure = departure_time(problem, motion.p, motion.terms, last - half_period / 2, thresholds.DEPARTED * level)
+        departure = departure_time(
+            problem, motion.p, motion.terms, last - half_period / 2, thresholds.DEPARTURE_RATIO * level
+        )
         if departure < last + half_period / 2 or departure >= problem.t[-1]:
             break
         last = departure
@@ -242,7 +244,7 @@ def departure_time(problem: DecayProblem, p: np.ndarray, terms: Terms, after: fl
     for i, (low, high) in enumerate(pairwise(edges)):
         if starts[i] >= after and high > low and robust_std(e[low:high]) > limit:
             before = np.abs(e[edges[max(i - 1, 0)] : low]) > limit
-            is_partly_departed = before.any() and before.mean() > thresholds.PARTLY_DEPARTED
+            is_partly_departed = before.any() and before.mean() > thresholds.DEPARTURE_SHARE
             return float(starts[i - 1] if is_partly_departed else starts[i])
     return float(problem.t[-1])
 

@@ -227,8 +227,8 @@ def identify_record(
     full = next(law for law in laws if law.terms == terms)
     uncertainty = estimate_uncertainty(problem, full.p, terms, choices)
     check_fit(record, problem, full, uncertainty, parameters.pendulum)
-    reported = select_reported_law(laws, full, problem)
-    by_unknown = make_estimates(record, problem, reported, full, uncertainty)
+    reported_law = select_reported_law(laws, full, problem)
+    by_unknown = make_estimates(record, problem, reported_law, full, uncertainty)
     remarks = [*make_remarks(record, problem, full, uncertainty)]
     estimates = tuple(by_unknown.values())
     if is_unreliable(problem, uncertainty):

@@ -58,7 +58,7 @@ class FitUncertainty:
     unknowns: np.ndarray
     standard_errors: np.ndarray
     correlation: np.ndarray
-    unconstrained: np.ndarray
+    unconstrained_values: np.ndarray
     distance_from_losses: float
     rms: float
     neighbour_correlation: float
@@ -94,9 +94,9 @@ def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms, cho
             [variance, *(block_variances(jacobian, e, inverse, count) for count in sorted(counts))], axis=0
         )
     errors = np.sqrt(np.maximum(variance, noise * np.diag(inverse) + dependences.variances * scale**2)) / scale
-    unconstrained = p[unknowns] - inverse @ (jacobian.T @ e) / scale
+    unconstrained_values = p[unknowns] - inverse @ (jacobian.T @ e) / scale
     correlation, losses = to_correlation(inverse), (unknowns >= ZETA) & (variance > 0)
-    z = unconstrained[losses] * scale[losses] / np.sqrt(variance[losses])
+    z = unconstrained_values[losses] * scale[losses] / np.sqrt(variance[losses])
     distance = nearest_means(z, correlation[np.ix_(losses, losses)])[1] if len(z) else 0.0
     if distance > thresholds.NEGATIVE and not dependences.sizes:
         errors = np.where(unknowns >= ZETA, distance * errors, errors)
@@ -104,7 +104,7 @@ def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms, cho
         unknowns,
         special.ndtri(1 - (1 - UPPER) / choices) / NORMAL_QUANTILE * errors,
         correlation,
-        unconstrained,
+        unconstrained_values,
         distance,
         rms,
         neighbour_correlation,
@@ -199,7 +199,7 @@ def nearest_means(z: np.ndarray, correlation: np.ndarray, first: float | None = 
     The distance is in standard errors of measurements with this correlation matrix (k, k).
     """
     sizes, axes = np.linalg.eigh(correlation)
-    weights = axes / np.sqrt(np.maximum(sizes, thresholds.SEEN)) @ axes.T
+    weights = axes / np.sqrt(np.maximum(sizes, thresholds.RANK_RTOL)) @ axes.T
     if first is None:
         return optimize.nnls(weights, weights @ z)
     aim = weights @ z - weights[:, 0] * first

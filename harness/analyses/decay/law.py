@@ -259,11 +259,11 @@ def iterate_return_map(
     weights = np.cos(np.outer(order, angle)) * 2 / count
     weights[0] /= 2
     coefficients = np.stack([next_share, node_cycles.duration.reshape(-1, count)]) @ weights.T
-    ones = np.ones(len(laws))
-    shares, durations, min_share, at = [ones], [np.zeros(len(laws))], min_amplitude * scale[0] - 1, 0.0
+    max_share = np.ones(len(laws))
+    shares, durations, min_share, at = [max_share], [np.zeros(len(laws))], min_amplitude * scale[0] - 1, 0.0
     polynomials: list[np.ndarray] = []
     while first[0] > low[0] and len(polynomials) < max_count and shares[-1][0] > min_share and at <= end:
-        angle = np.arccos(np.minimum(np.maximum(shares[-1], -ones), ones))
+        angle = np.arccos(np.minimum(np.maximum(shares[-1], -max_share), max_share))
         polynomials.append(np.cos(np.multiply.outer(angle, order)))
         share, duration = np.vecdot(polynomials[-1], coefficients)
         shares.append(share)
@@ -312,8 +312,8 @@ def taylor_coefficients(
         np.divide(force, n, out=velocity[at])
         if has_drag:
             np.multiply(b, velocity[at], out=damping[at])
-    missing = 0 if is_pendulum else order - 1
-    np.divide(velocity[missing:], INDICES[missing:order], out=series[missing + 1 :])
+    first_missing = 0 if is_pendulum else order - 1
+    np.divide(velocity[first_missing:], INDICES[first_missing:order], out=series[first_missing + 1 :])
     return series
 
 

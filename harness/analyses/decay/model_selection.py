@@ -78,15 +78,15 @@ def fit_all_laws(
         if not other_terms:
             fits[law] = full
             continue
-        reduced, start = full[0].copy(), full[0].copy()
-        reduced[[ZETA + TERMS.index(term) for term in other_terms]] = 0.0
+        reduced_values, start = full[0].copy(), full[0].copy()
+        reduced_values[[ZETA + TERMS.index(term) for term in other_terms]] = 0.0
         start[ZETA:] = estimate_losses(amplitudes, law, problem.model.is_pendulum)
-        best = min(reduced, start, key=lambda p: float(np.sum(problem.residuals(p, law)[0] ** 2)))
+        best = min(reduced_values, start, key=lambda p: float(np.sum(problem.residuals(p, law)[0] ** 2)))
         fits[law] = problem.fit(best, law)
     for _ in range(thresholds.MAX_REFITS):
-        for part, whole in permutations(laws, 2):
-            if set(part) < set(whole) and fits[whole][1] > fits[part][1] * (1 + 1e-9) + 1e-30:
-                fits[whole] = min(problem.fit(fits[part][0], whole), fits[part], key=lambda fit: fit[1])
+        for sublaw, law in permutations(laws, 2):
+            if set(sublaw) < set(law) and fits[law][1] > fits[sublaw][1] * (1 + 1e-9) + 1e-30:
+                fits[law] = min(problem.fit(fits[sublaw][0], law), fits[sublaw], key=lambda fit: fit[1])
     n = len(problem.t)
 
     def bic(law: Terms) -> float:

@@ -11,7 +11,7 @@ from .intervals import FitUncertainty
 from .law import AMPLITUDE, OMEGA, REST
 from .model_selection import FittedLaw, deviance_difference
 
-WIDENED = "The intervals are widened."
+WIDENING_NOTE = "The intervals are widened."
 
 
 def check_fit(
@@ -60,19 +60,19 @@ def make_remarks(
         return ()
     is_rough = uncertainty.rms > thresholds.ROUGH * problem.noise
     remarks = []
-    correlated = "the noise is not independent from sample to sample"
+    cause = "the noise is not independent from sample to sample"
     if is_rough:
         share = uncertainty.rms / problem.signal_rms
         e, _ = problem.residuals(full.p, full.terms)
         if is_unreliable(problem, uncertainty):
             advice = "Do not rely on these values."
         else:
-            advice = WIDENED if uncertainty.is_correlated else "Check the time stamps."
+            advice = WIDENING_NOTE if uncertainty.is_correlated else "Check the time stamps."
         remarks.append(
             f"The residuals of the fit are {rms:.3g} {unit} (rms), {100 * share:.2g} % of the "
             f"motion, and largest near t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s, "
             f"while the noise of the samples is {noise:.3g} {unit}: something else acts on the oscillator too, or "
-            f"{correlated}. {advice}"
+            f"{cause}. {advice}"
         )
         if problem.noise < thresholds.NOISELESS * full.p[AMPLITUDE]:
             remarks[0] += (
@@ -81,15 +81,15 @@ def make_remarks(
             )
     elif uncertainty.is_correlated:
         remarks.append(
-            f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. {WIDENED}"
+            f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {cause}. {WIDENING_NOTE}"
         )
-    named = dependences_remark(problem, uncertainty.dependences.sizes, unit)
-    if not named and (distance := uncertainty.distance_from_losses) > thresholds.NEGATIVE:
-        named = [
+    effect_remarks = dependences_remark(problem, uncertainty.dependences.sizes, unit)
+    if not effect_remarks and (distance := uncertainty.distance_from_losses) > thresholds.NEGATIVE:
+        effect_remarks = [
             f"A loss below zero would fit better, by {distance:.1f} standard errors, as with an amplitude that "
-            f"wanders. {WIDENED}"
+            f"wanders. {WIDENING_NOTE}"
         ]
-    return (*remarks, *named, *rounding_remark(problem, full, unit))
+    return (*remarks, *effect_remarks, *rounding_remark(problem, full, unit))
 
 
 def dependences_remark(problem: DecayProblem, sizes: dict[str, float], unit: str) -> list[str]:
@@ -104,7 +104,7 @@ def dependences_remark(problem: DecayProblem, sizes: dict[str, float], unit: str
         )
     return [
         f"The record departs from the law, {parts} (rms), as with {' or '.join(CAUSES[name] for name in sizes)}. "
-        f"{WIDENED}{remedy}"
+        f"{WIDENING_NOTE}{remedy}"
     ]
 
 
@@ -116,8 +116,8 @@ def rounding_remark(problem: DecayProblem, full: FittedLaw, unit: str) -> tuple[
     """
     amplitudes, starts = problem.half_cycles(full.p)
     positions = full.p[REST] + problem.model.initial_sign * amplitudes * (-1.0) ** np.arange(len(amplitudes))
-    recorded = (starts >= 0) & (starts <= problem.t[-1])
-    amplitudes, positions, step = amplitudes[recorded], positions[recorded], problem.quantiser_step
+    is_recorded = (starts >= 0) & (starts <= problem.t[-1])
+    amplitudes, positions, step = amplitudes[is_recorded], positions[is_recorded], problem.quantiser_step
     if not step or problem.model.order or len(amplitudes) < thresholds.MIN_ROUNDED:
         return ()
     resultant = abs(np.mean(np.exp(2j * np.pi * positions * problem.scale / step)))

@@ -36,8 +36,8 @@ def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     """
     changes = np.flatnonzero(np.diff(x))
     if len(changes) and changes[-1] - changes[0] > 2 * MIN_SAMPLES:
-        moving = slice(changes[0], changes[-1] + 2)
-        t, x = t[moving], x[moving]
+        moving_part = slice(changes[0], changes[-1] + 2)
+        t, x = t[moving_part], x[moving_part]
     noise = robust_std(interpolation_residuals(t, x))
     differences = np.diff(np.unique(x))
     differences = differences[differences > 1e-9 * np.ptp(x)]  # smaller ones are rounding errors
@@ -59,10 +59,10 @@ def remove_spikes(record: Motion) -> Motion:
         t, x = np.delete(t, spikes), np.delete(x, spikes)
         if not len(spikes) or len(x) < (1 - thresholds.MAX_SPIKES) * len(record.x):
             break
-    removed = len(record.x) - len(x)
-    if not 0 < removed <= thresholds.MAX_SPIKES * len(record.x):
+    n_removed = len(record.x) - len(x)
+    if not 0 < n_removed <= thresholds.MAX_SPIKES * len(record.x):
         return record
-    note = f"{removed} of {len(record.x)} samples are outliers and are left out."
+    note = f"{n_removed} of {len(record.x)} samples are outliers and are left out."
     return replace(record, t=t, x=x, notes=(*record.notes, note))
 
 

@@ -48,23 +48,23 @@ class SignalModel:
         -------
         laws : numpy.ndarray
             Rows (1 + V, 4) of A, zeta, r, b.
-        changed : numpy.ndarray
+        changed_unknowns : numpy.ndarray
             Index (V,) in UNKNOWNS of the unknown that each further row changes.
         changes : numpy.ndarray
             Change (V,) of that unknown.
         """
-        changed = unknowns[(unknowns == AMPLITUDE) | (unknowns >= ZETA)]
+        changed_unknowns = unknowns[(unknowns == AMPLITUDE) | (unknowns >= ZETA)]
         a = p[AMPLITUDE]
         sizes = {AMPLITUDE: 1e-6 * a, ZETA: 1e-7, R: 1e-7 * a, B: 1e-6 / a}
-        changes = np.array([sizes[unknown] for unknown in changed.tolist()])
-        laws = np.tile(p[LAW], (1 + len(changed), 1))
-        for row, (unknown, change) in enumerate(zip(changed, changes, strict=True), 1):
+        changes = np.array([sizes[unknown] for unknown in changed_unknowns.tolist()])
+        laws = np.tile(p[LAW], (1 + len(changed_unknowns), 1))
+        for row, (unknown, change) in enumerate(zip(changed_unknowns, changes, strict=True), 1):
             laws[row, unknown == LAW] += change
-        return laws, changed, changes
+        return laws, changed_unknowns, changes
 
     def __call__(self, p: np.ndarray, unknowns: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the signal (n,) at rising times t (n,) in s, and its Jacobian (n, k) for k of the UNKNOWNS."""
-        laws, changed, changes = self.perturbed_laws(p, unknowns)
+        laws, changed_unknowns, changes = self.perturbed_laws(p, unknowns)
         theta = p[OMEGA] * (t - p[T0])
         end = float(theta[-1]) if len(t) else 0.0
         sequence = iterate_return_map(laws, self.is_pendulum, self.min_amplitude, end=end)
@@ -93,7 +93,7 @@ class SignalModel:
             factor * rate * (t[first:last] - p[T0]) + self.order / p[OMEGA] * signal[first:last]
         )
         short = series[:, : int(DERIVATIVE_TERMS * series.shape[1])]
-        for i, (unknown, change) in enumerate(zip(changed.tolist(), changes.tolist(), strict=True), 1):
+        for i, (unknown, change) in enumerate(zip(changed_unknowns.tolist(), changes.tolist(), strict=True), 1):
             delay = (starts[:-1, i] - starts[:-1, 0]) / change
             slope = factor * (evaluate_columns((short[i] - short[0]) / change, column, h) - rate * delay[cycle])
             ends = at_rest * (amplitudes[[0, -1], i] - amplitudes[[0, -1], 0]) / change
@@ -105,11 +105,11 @@ class SignalModel:
 
     def predict_amplitudes(self, p: np.ndarray, unknowns: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Return amplitudes (count + 1,), repeated after the end of the motion, and their Jacobian (count + 1, k)."""
-        laws, changed, changes = self.perturbed_laws(p, unknowns)
+        laws, changed_unknowns, changes = self.perturbed_laws(p, unknowns)
         sizes = iterate_return_map(laws, self.is_pendulum, self.min_amplitude, count).amplitudes
         sizes = np.pad(sizes, ((0, count + 1 - len(sizes)), (0, 0)), mode="edge")
         jacobian = np.zeros((count + 1, len(unknowns)))
-        for i, (unknown, change) in enumerate(zip(changed, changes, strict=True), 1):
+        for i, (unknown, change) in enumerate(zip(changed_unknowns, changes, strict=True), 1):
             jacobian[:, np.flatnonzero(unknowns == unknown)[0]] = (sizes[:, i] - sizes[:, 0]) / change
         return sizes[:, 0], jacobian
 
@@ -127,11 +127,11 @@ class SignalModel:
         jacobian : numpy.ndarray
             Derivatives (2, count, k) of times and positions by k of the UNKNOWNS, without the drift.
         """
-        laws, changed, changes = self.perturbed_laws(p, unknowns)
+        laws, changed_unknowns, changes = self.perturbed_laws(p, unknowns)
         sequence = iterate_return_map(laws, self.is_pendulum, self.min_amplitude, count)
         amplitudes, starts = sequence.amplitudes, sequence.starts
-        missing = count + 1 - len(amplitudes)
-        pad = ((0, max(missing, 0)), (0, 0))
+        n_missing = count + 1 - len(amplitudes)
+        pad = ((0, max(n_missing, 0)), (0, 0))
         sizes = np.pad(amplitudes, pad, constant_values=np.nan)[1:]
         theta = np.pad(starts, pad, constant_values=np.nan)[1:]
         sign = self.initial_sign * (-1.0) ** np.arange(1, count + 1)
@@ -141,7 +141,7 @@ class SignalModel:
         jacobian[0, :, column[T0]] = 1.0
         jacobian[0, :, column[OMEGA]] = -theta[:, 0] / p[OMEGA] ** 2
         jacobian[1, :, column[REST]] = 1.0
-        for variant, (unknown, change) in enumerate(zip(changed.tolist(), changes.tolist(), strict=True), 1):
+        for variant, (unknown, change) in enumerate(zip(changed_unknowns.tolist(), changes.tolist(), strict=True), 1):
             jacobian[0, :, column[unknown]] = (theta[:, variant] - theta[:, 0]) / (change * p[OMEGA])
             jacobian[1, :, column[unknown]] = sign * (sizes[:, variant] - sizes[:, 0]) / change
         return times, p[REST] + p[DRIFT] * (times - self.t_mid) + sign * sizes[:, 0], jacobian
@@ -167,6 +167,6 @@ def evaluate_with_derivative(series: np.ndarray, column: np.ndarray, h: np.ndarr
     return total, slope
 
 
-def extend_at_rest(before: int, moving: np.ndarray, after: int, ends: np.ndarray) -> np.ndarray:
+def extend_at_rest(before: int, values: np.ndarray, after: int, ends: np.ndarray) -> np.ndarray:
     """Extend values of the motion by `before` and `after` samples at rest, which have the values `ends`."""
-    return np.concatenate([np.full(before, ends[0]), moving, np.full(after, ends[1])])
+    return np.concatenate([np.full(before, ends[0]), values, np.full(after, ends[1])])

@@ -70,12 +70,12 @@ MIN_EXTRAPOLATED = 2.0  # rad: the start of a pendulum beyond it, near its upper
 
 # --- Fit of the signal (decay_problem.py) ---
 MODEL_ACCURACY = 1e-9  # relative to the motion: truncation error of the series, below which no fit is better
-UNREACHED = 30.0  # standard errors: residual of a turning point that the motion never reaches
+UNREACHED_RESIDUAL = 30.0  # standard errors: residual of a turning point that the motion never reaches
 FIT_WINDOWS = (0.08, 0.2, 0.45, 1.0)  # fractions of a record: the fit of one window predicts the phase in the next
 FIT_WINDOW_STEPS = 15  # of the fit of a window, which only starts that of the next one
 MIN_WINDOW = 5.0  # half periods: shorter windows do not separate the losses
 MAX_COARSE_SAMPLES = 10_000  # a fit starts with a subset of about this size, whose noise does not matter yet
-UNEXPLAINED = 1.3  # times the noise: larger residuals call for a fit by growing windows
+UNEXPLAINED_RATIO = 1.3  # times the noise: larger residuals call for a fit by growing windows
 CONVERGED_GAIN = 1e-2  # variances of a sample: a fit whose next step gains less has converged to a tenth of an error
 CONVERGED_CHANGE = 1e-14  # relative, of the values: records without noise converge to rounding
 ABSENT_LOSS = 1e-2  # standard errors: a loss that the fit pushes to zero and that is smaller is zero
@@ -88,14 +88,14 @@ CERTAIN_TIME = 0.6  # half periods after the last turning point: the motion cert
 MIN_QUANTISER_STEPS = 2.0  # between the turning points of a half cycle: with fewer, a record repeats one value
 BETTER_START = 0.5  # of the mean square of the residuals: a start is left out only if that halves it at least
 MAX_OUTLIERS = 0.001  # fraction of the samples, in addition to two: a record with more does not follow the law
-DISTURBED = 2.0  # times the noise: residuals of a record, or of its first half cycle, that depart from the law
+DISTURBANCE_RATIO = 2.0  # times the noise: residuals of a record, or of its first half cycle, that depart from the law
 UNDISTURBED_PARTS = (0.8, 0.6, 0.35)  # fractions of the turning points that are tried as undisturbed
 MIN_UNDISTURBED = 6  # turning points before a disturbance, to know the law that it departs from
 MAX_EXTENSIONS = 6  # of the samples before a disturbance: each fit is valid a little farther than its samples
-DEPARTED = 4.0  # times the noise: residual of a half cycle that departs from the law
+DEPARTURE_RATIO = 4.0  # times the noise: residual of a half cycle that departs from the law
 BETTER_PART = 1.4  # ratio of the residuals of the whole record to those of an undisturbed part that are noise
 BETTER_ROUGH_PART = 4.0  # the same if the part departs from the law as well
-PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before it, from which on it departs as well
+DEPARTURE_SHARE = 0.05  # fraction of departed samples in the half cycle before it, from which on it departs as well
 
 # --- Selection of the law (model_selection.py) ---
 MAX_REFITS = 2  # passes over all pairs of laws: each improves the fits of the one before
@@ -108,8 +108,8 @@ INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well b
 
 # --- Test of the residuals (dependences.py) ---
 WALK_PIECES = 8  # of the random walk of phase, amplitude and rest position over a record
-SEEN = 1e-9  # of the largest eigenvalue, or singular value: smaller parts are those that the fitted values follow
-PROVEN = 3.0  # of the logarithm of the likelihood, odds of 20 to 1: white noise exceeds it in one record of 140
+RANK_RTOL = 1e-9  # of the largest eigenvalue, or singular value: smaller parts are those that the fitted values follow
+MIN_GAIN = 3.0  # of the logarithm of the likelihood, odds of 20 to 1: white noise exceeds it in one record of 140
 RISE_SPEEDS = (0.05, 0.1, 0.2, 0.4)  # of the first peak speed: the rise of friction falls to 1/e there
 MIN_SPEED_HALF_CYCLES = 8  # with fewer, the laws with three losses follow every rise
 MIN_SENSITIVITY = 1e-3  # of an amplitude to the first one

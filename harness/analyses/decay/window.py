@@ -122,16 +122,16 @@ def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float, int]:
     """
     if not np.ptp(record.x) > 0:
         raise HarnessError(f"{record.name} does not move: every value is {record.x[0]:.6g} {record.unit}")
-    measured = remove_spikes(record)
-    noise, _ = estimate_noise(measured.t, measured.x)
-    periods = half_periods(measured, noise)
+    clean_record = remove_spikes(record)
+    noise, _ = estimate_noise(clean_record.t, clean_record.x)
+    periods = half_periods(clean_record, noise)
     # the angular acceleration of a pendulum has two peaks per half cycle at large amplitudes: no window is searched
     if pendulum and record.order == 2:
         return record, periods[0], 1
     best: Decay | None = None
     motions: list[Swings] = []
     for period in periods:
-        swings = measure_swings(measured, period, noise, pendulum)
+        swings = measure_swings(clean_record, period, noise, pendulum)
         if swings is None:
             continue
         motions.append(swings)
@@ -327,5 +327,5 @@ def crop(record: Motion, best: Decay, decays: list[Decay]) -> Motion:
     if rivals := [other for other in others if other.weight > thresholds.RIVAL * best.weight]:
         spans = ", ".join(f"{t(other.begin)} to {t(other.end)}" for other in rivals)
         note += f" The record also decays from t = {spans} s: select a part with {selection_text()}."
-    cropped = record.select(begin, end)
-    return replace(cropped, notes=(*record.notes, note))
+    part = record.select(begin, end)
+    return replace(part, notes=(*record.notes, note))

@@ -121,8 +121,8 @@ def shared_json(
 ) -> dict[str, Any]:
     """Return the JSON keys that the results of `decay` and `fit` share."""
     return {
-        "record": ", ".join(used.record for used in samples),
-        "records": [used.as_json() for used in samples],
+        "record": ", ".join(part.record for part in samples),
+        "records": [part.as_json() for part in samples],
         "columns": [asdict(column) for column in columns],
         "fit": [asdict(estimate) for estimate in estimates],
         "remarks": [*remarks],
@@ -185,17 +185,17 @@ def find_reversals(x: np.ndarray, threshold: float) -> np.ndarray:
     """Return the samples at which x (n,) reverses by `threshold` or more, including the first extremum."""
     reversals: list[int] = []
     low = high = 0
-    rising = None
+    is_rising = None
     values = x.tolist()
     for i, value in enumerate(values):
         if value > values[high]:
             high = i
         if value < values[low]:
             low = i
-        if rising is not False and values[high] - value >= threshold:
+        if is_rising is not False and values[high] - value >= threshold:
             reversals.append(high)
-            rising, low = False, i
-        elif rising is not True and value - values[low] >= threshold:
+            is_rising, low = False, i
+        elif is_rising is not True and value - values[low] >= threshold:
             reversals.append(low)
-            rising, high = True, i
+            is_rising, high = True, i
     return np.array(reversals, int)

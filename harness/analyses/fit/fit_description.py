@@ -16,9 +16,9 @@ from .search import ROUGH
 from .uncertainty import INDETERMINATE, Uncertainty, determined_combinations, split_residuals
 
 UNFIT_SHARE, UNFIT_NOISE = 0.1, 2.0  # residuals as a share of the range, and in units of the noise
-REST_PARTS, AVERAGED = 20, 0.5  # means of noise over so many parts are smaller than this share of it
-EXPLAINED = 0.3  # share of the residuals that the noise of the inputs makes, from which it is named
-SHIFTED = 0.25  # share of a variance that the error of the inputs adds, from which there is a remark
+REST_PARTS, MEAN_SHARE = 20, 0.5  # means of noise over so many parts are smaller than this share of it
+INPUT_NOISE_SHARE = 0.3  # share of the residuals that the noise of the inputs makes, from which it is named
+SHIFT_SHARE = 0.25  # share of a variance that the error of the inputs adds, from which there is a remark
 
 
 def describe_fit(
@@ -35,14 +35,16 @@ def describe_fit(
         for column, is_rest in zip(columns, find_rests(problem.records, predictions, residuals), strict=True)
     )
     estimates, ambiguous = make_estimates(problem, raw_fit, is_unfit)
-    undetermined = [i for i, estimate in enumerate(estimates) if not isfinite(estimate.error)]
+    undetermined_indices = [i for i, estimate in enumerate(estimates) if not isfinite(estimate.error)]
     values = np.array([estimate.value for estimate in estimates])
-    combinations = () if is_unfit else determined_combinations(problem.unknowns, values, uncertainty, undetermined)
+    combinations = (
+        () if is_unfit else determined_combinations(problem.unknowns, values, uncertainty, undetermined_indices)
+    )
     deviations = np.sqrt(np.diag(uncertainty.covariance))
     remarks = (
         unfit_remark(columns, uncertainty)
         if is_unfit
-        else fit_remarks(problem, raw_fit, columns, estimates, ambiguous, undetermined)
+        else fit_remarks(problem, raw_fit, columns, estimates, ambiguous, undetermined_indices)
     )
     return ParameterFit(
         fmu=fmu,
@@ -60,7 +62,7 @@ def describe_fit(
         n_runs=n_runs,
         seconds=seconds,
         log=tuple(raw_fit.log),
-        records=tuple(record.fitted for record in problem.records),
+        records=tuple(record.fitted_record for record in problem.records),
         predictions=tuple(predictions),
     )
 
@@ -98,7 +100,7 @@ def find_rests(
     rests = []
     for record, prediction, e in zip(records, predictions, residuals, strict=True):
         means = np.array([part.mean(axis=0) for part in np.array_split(e, REST_PARTS)])
-        averages_out = np.sqrt((means**2).mean(axis=0)) < AVERAGED * np.sqrt((e**2).mean(axis=0))
+        averages_out = np.sqrt((means**2).mean(axis=0)) < MEAN_SHARE * np.sqrt((e**2).mean(axis=0))
         rests += [*((np.ptp(prediction, axis=0) < record.noise) & averages_out)]
     return rests
 
@@ -159,7 +161,7 @@ def describe_cause(problem: FitProblem, uncertainty: Uncertainty) -> str:
     """Return the likely cause of residuals that are not white noise."""
     noisy = {name: share for record in problem.records for name, share in record.noisy_inputs.items()}
     rms = float(np.sqrt(np.mean(uncertainty.residuals**2)))
-    if noisy and uncertainty.input_noise > EXPLAINED * rms:
+    if noisy and uncertainty.input_noise > INPUT_NOISE_SHARE * rms:
         inputs = " and ".join(f"the input {name}, {100 * share:.2g} % of its range," for name, share in noisy.items())
         return f"the noise of {inputs} makes residuals of this size; filter it, or sample it faster"
     if uncertainty.dependence:
@@ -173,7 +175,7 @@ def fit_remarks(
     columns: Sequence[ColumnResiduals],
     estimates: Sequence[Estimate],
     ambiguous: Sequence[str],
-    undetermined: Sequence[int],
+    undetermined_indices: Sequence[int],
 ) -> list[str]:
     """Return the remarks on a fit."""
     uncertainty, remarks = raw_fit.uncertainty, []
@@ -185,14 +187,15 @@ def fit_remarks(
             f"{describe_cause(problem, uncertainty)}. The intervals are widened."
         )
     white = np.diag(uncertainty.covariance)
-    shifted = [
+    shifted_names = [
         estimate.name
         for estimate, shift, variance in zip(estimates, uncertainty.input_shift, white, strict=True)
-        if shift**2 > SHIFTED * variance
+        if shift**2 > SHIFT_SHARE * variance
     ]
-    if shifted:
+    if shifted_names:
         remarks.append(
-            f"The inputs between their samples are uncertain, which affects {', '.join(shifted)}: sample them faster."
+            f"The inputs between their samples are uncertain, which affects {', '.join(shifted_names)}: sample them "
+            "faster."
         )
     if ambiguous:
         remarks.append(f"Other values fit as well; the intervals of {', '.join(ambiguous)} include them.")
@@ -202,8 +205,8 @@ def fit_remarks(
             f"Values of {', '.join(tails)} far outside of their intervals fit nearly as well, because a small part of "
             "the record excludes them: do not rely on these intervals, or take a longer record."
         )
-    if undetermined:
-        names = ", ".join(estimates[i].name for i in undetermined)
+    if undetermined_indices:
+        names = ", ".join(estimates[i].name for i in undetermined_indices)
         remarks.append(f"The record does not determine {names}.")
     return remarks
 
@@ -234,17 +237,17 @@ def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[Samples]) -> V
     ]
     columns = column_residuals(records, residuals, problem.outputs)
     remarks = tuple(validation_remarks(problem, raw_fit, columns, residuals))
-    return Validation(columns, tuple(record.fitted for record in records), tuple(predictions), remarks)
+    return Validation(columns, tuple(record.fitted_record for record in records), tuple(predictions), remarks)
 
 
 def prepare_record(problem: FitProblem, raw_fit: RawFit, data: Samples) -> MeasuredRecord:
     """Return a record that is averaged and whose inputs are subdivided as those of the first fitted record."""
-    fitted = problem.records[0]
-    record = MeasuredRecord(fitted.simulator, data, fitted.width > 1)
+    fitted_record = problem.records[0]
+    record = MeasuredRecord(fitted_record.simulator, data, fitted_record.width > 1)
     if not record.can_be_averaged(problem.values(raw_fit.z, 0)):
-        record = MeasuredRecord(fitted.simulator, data, binned=False)
-    record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
-    record.subdivide(fitted.subdivision)
+        record = MeasuredRecord(fitted_record.simulator, data, is_averaged=False)
+    record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted_record.noise)  # of a body at rest
+    record.subdivide(fitted_record.subdivision)
     return record
 
 
@@ -255,8 +258,8 @@ def validation_remarks(
 
     If the fit is robust, outliers have no effect on either.
     """
-    fitted = [root_mean_squares(e) for e in split_residuals(problem, raw_fit.uncertainty.residuals)]
-    limits = WORSE * np.maximum(np.max(fitted, axis=0), 1.0)
+    fitted_rms = [root_mean_squares(e) for e in split_residuals(problem, raw_fit.uncertainty.residuals)]
+    limits = WORSE * np.maximum(np.max(fitted_rms, axis=0), 1.0)
     ratios = np.concatenate([root_mean_squares(problem.limit_outliers(e)) for e in residuals])
     for column, ratio, limit in zip(columns, ratios, np.tile(limits, len(residuals)), strict=True):
         if ratio > limit:

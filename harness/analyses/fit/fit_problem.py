@@ -46,13 +46,13 @@ class FitProblem:
         records: Sequence[MeasuredRecord],
         outputs: Sequence[str],
         unknowns: Sequence[Unknown],
-        fixed: Mapping[str, float],
+        fixed_values: Mapping[str, float],
         robust: bool = False,
         derivatives: DerivativeRuns | None = None,
     ) -> None:
         self.derivatives = derivatives
         self.records, self.outputs = tuple(records), list(outputs)
-        self.unknowns, self.fixed, self.robust = tuple(unknowns), dict(fixed), robust
+        self.unknowns, self.fixed_values, self.robust = tuple(unknowns), dict(fixed_values), robust
         self.sensors = [(i, unknown) for i, unknown in enumerate(self.unknowns) if unknown.column is not None]
         self.region = FeasibleRegion(self.unknowns)
         self.low, self.high = np.array([unknown.search_range for unknown in self.unknowns]).T
@@ -77,12 +77,12 @@ class FitProblem:
 
     def values(self, z: np.ndarray, record: int) -> dict[str, float]:
         """Return the values to set for a record."""
-        fitted = {
+        fitted_values = {
             unknown.variable: unknown.to_value(coordinate)
             for unknown, coordinate in zip(self.unknowns, z.tolist(), strict=True)
             if unknown.column is None and unknown.record in (None, record)
         }
-        return self.fixed | fitted
+        return self.fixed_values | fitted_values
 
     def predict(self, z: np.ndarray, selection: Selection) -> list[np.ndarray] | None:
         """Return the sensor signals at the selected samples of each record; None if the FMU refuses the values."""
@@ -167,7 +167,7 @@ class FitProblem:
             d = h * np.eye(len(z))[i]
             up = self.residuals(z + d, selection)
             down = self.residuals(z - d, selection) if central or up is None else None
-            ends = [(shifted, side) for shifted, side in ((up, 1), (down, -1), (e, 0)) if shifted is not None][:2]
+            ends = [(end, side) for end, side in ((up, 1), (down, -1), (e, 0)) if end is not None][:2]
             if len(ends) == 2:
                 columns[:, j] = (ends[0][0] - ends[1][0]) / (h * (ends[0][1] - ends[1][1]))
         return columns
@@ -191,7 +191,9 @@ class FitProblem:
         """Return the derivatives (samples, columns, k) of the sensor signals of record i; None if there are none."""
         assert self.derivatives is not None
         values = self.values(z, i)
-        names = [one.variable for one in self.unknowns if one.column is None and one.record in (None, i)]
+        names = [
+            unknown.variable for unknown in self.unknowns if unknown.column is None and unknown.record in (None, i)
+        ]
         solution = self.derivatives.differentiate(spec, names, values)
         if solution is None:
             return None
@@ -225,9 +227,9 @@ class FitProblem:
             jacobian = self.jacobian(z, e, self.all, np.arange(len(z)), central=True)
             size = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])
             if size < lowest - CLEAR or lowest == np.inf:
-                best, lowest, chosen = steps, size, jacobian
+                best, lowest, best_jacobian = steps, size, jacobian
         self.steps = best
-        return chosen
+        return best_jacobian
 
     def minimize(
         self,

@@ -71,7 +71,7 @@ def fit_records(
     simulator: Simulator,
     data: Sequence[Samples],
     unknowns: Sequence[Unknown],
-    fixed: Mapping[str, float],
+    fixed_values: Mapping[str, float],
     robust: bool,
     report: Callable[[float], None],
     averages: bool = True,
@@ -103,9 +103,9 @@ def fit_records(
                     f"{size:.3g}: give the standard deviation of the noise, from {least:.3g} to {largest:.3g}"
                 )
     warm_start: np.ndarray | None = None
-    for binned in (True, False) if averages else (False,):
-        records = [MeasuredRecord(simulator, record_data, binned) for record_data in data]
-        problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust, derivatives)
+    for is_averaged in (True, False) if averages else (False,):
+        records = [MeasuredRecord(simulator, record_data, is_averaged) for record_data in data]
+        problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed_values, robust, derivatives)
         raw_fit = search_and_refine(problem, warm_start, any(record_data.sigma for record_data in data), report)
         if is_averaging_negligible(problem, raw_fit):
             break
@@ -155,7 +155,7 @@ def search_and_refine(
     minima: list[Minimum] = []
     sides = [(i, side) for i in range(len(z)) for side in (-1, 1)]
     searched_squares = np.inf  # at the last search for other minima
-    for remaining in reversed(range(ROUNDS)):
+    for remaining_rounds in reversed(range(ROUNDS)):
         squares, z = problem.minimize(z, problem.all, 30, 1e-9, central=True)
         check_motion(problem, squares)
         uncertainty = estimate_uncertainty(problem, z, input_error, 0.0)
@@ -163,17 +163,17 @@ def search_and_refine(
         if squares < searched_squares - uncertainty.variance:
             minima = find_other_minima(problem, z, uncertainty, result.minima, squares)
             searched_squares = squares
-            if remaining and minima and minima[0][0] < squares - SHALLOW * uncertainty.variance:
+            if remaining_rounds and minima and minima[0][0] < squares - SHALLOW * uncertainty.variance:
                 z = minima[0][1]
                 continue
         better, flat_tails = None, []
         for n, (i, side) in enumerate(sides):
             report(0.7 + 0.3 * n / len(sides))
-            bound = search_bound(problem, z, uncertainty, i, side, ends_at_better=remaining > 0)
+            bound = search_bound(problem, z, uncertainty, i, side, ends_at_better=remaining_rounds > 0)
             ends[i, side], profiles[i, side] = bound.end, bound.profile
             flat_tails += [i] * bound.has_flat_tail
             better = bound.better if better is None else better
-            if remaining and better is not None:
+            if remaining_rounds and better is not None:
                 z = better
                 break
         if better is None:

@@ -112,7 +112,7 @@ class MeasuredRecord:
         Its specification has the observed outputs, one for each column.
     data : Samples
         The record in the units of the FMU.
-    binned : bool
+    is_averaged : bool
         Whether a long record is averaged.
 
     Attributes
@@ -126,13 +126,13 @@ class MeasuredRecord:
         Number of parts of each interval between samples, in each of which inputs are constant.
     """
 
-    def __init__(self, simulator: Simulator, data: Samples, binned: bool) -> None:
+    def __init__(self, simulator: Simulator, data: Samples, is_averaged: bool) -> None:
         t, y = data.t, data.y
         input_t = data.input_t if data.inputs else t
         self.simulator, self.name, self.sampled_t, self.sampled_y = simulator, data.name, t, y
         estimates = [estimate_noise(t, column) for column in y.T]
         self.step = np.array([step for _, step in estimates])
-        self.width = len(t) // MAX_SAMPLES if binned and len(t) > 2 * MAX_SAMPLES else 1
+        self.width = len(t) // MAX_SAMPLES if is_averaged and len(t) > 2 * MAX_SAMPLES else 1
         self.t, self.y, inputs = t, y, dict(data.inputs)
         if self.width > 1:
             self.t, self.y = bin_means(t, self.width), bin_means(y, self.width)
@@ -147,14 +147,14 @@ class MeasuredRecord:
         self.rows = np.searchsorted(self.knots, self.t)
         scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
         self.scatter = np.maximum(scatter, self.step / 12**0.5)
-        known = np.array([data.sigma.get(name, 0.0) for name in data.columns])
-        self.noise = np.where(known > 0, known / np.sqrt(self.width), self.scatter)
+        known_sigma = np.array([data.sigma.get(name, 0.0) for name in data.columns])
+        self.noise = np.where(known_sigma > 0, known_sigma / np.sqrt(self.width), self.scatter)
         self.all = np.arange(len(self.t))
         self.parts: dict[int, RecordPart] = {}
         self.subdivide(1)
 
     @property
-    def fitted(self) -> FittedRecord:
+    def fitted_record(self) -> FittedRecord:
         """Return the samples for the result, without the runs."""
         return FittedRecord(self.name, self.t, self.y, self.noise, self.sampled_t, self.width)
 
@@ -164,11 +164,13 @@ class MeasuredRecord:
         shares = np.arange(parts) / parts
         self.fine_t = np.append((t[:-1, None] + np.diff(t)[:, None] * shares).ravel(), t[-1])
         if parts == every == 1:
-            self.driven = self.inputs
+            self.fine_inputs = self.inputs
         else:
-            used = np.unique(np.append(np.arange(0, len(t), every), len(t) - 1))
-            self.driven = {name: CubicSpline(t[used], u[used])(self.fine_t) for name, u in self.inputs.items()}
-        self.spec = self.specify(self.t, self.fine_t, self.driven)
+            spline_rows = np.unique(np.append(np.arange(0, len(t), every), len(t) - 1))
+            self.fine_inputs = {
+                name: CubicSpline(t[spline_rows], u[spline_rows])(self.fine_t) for name, u in self.inputs.items()
+            }
+        self.spec = self.specify(self.t, self.fine_t, self.fine_inputs)
         self.run = self.simulator.prepare(self.spec)
 
     def specify(self, times: np.ndarray, knots: np.ndarray, inputs: Mapping[str, np.ndarray]) -> RunSpec:
@@ -242,11 +244,11 @@ class MeasuredRecord:
         """
         t, begin = self.t[index], self.t[0]
         shortest = SHORTEST_INTERVAL * (self.t[-1] - begin) / len(self.t)  # an FMU may refuse tiny steps
-        shifted = [t - delays.get(j, 0.0) for j in range(len(self.simulator.spec.outputs))]
-        sensor_times = [np.where(times - begin > shortest, times, begin) for times in shifted]
+        shifted_times = [t - delays.get(j, 0.0) for j in range(len(self.simulator.spec.outputs))]
+        sensor_times = [np.where(times - begin > shortest, times, begin) for times in shifted_times]
         knots, inputs = self.t[[0, index[-1]]], {}
         if self.inputs and len(index) == len(self.t):
-            knots, inputs = self.fine_t, self.driven
+            knots, inputs = self.fine_t, self.fine_inputs
         elif self.inputs:
             grid = self.sparse_knots(index)
             knots, inputs = self.knots[grid], {name: u[grid] for name, u in self.inputs.items()}

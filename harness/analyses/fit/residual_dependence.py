@@ -11,8 +11,8 @@ from .fit_problem import FitProblem
 from .measured_record import correlation_length
 from .unknowns import DELAY, OFFSET
 
-EXPLAINED = 0.3  # share of the squares of the residuals from which a dependence is named
-ABSORBED = 0.02  # share of the power of a dependence: with less left by the unknowns, it cannot be separated from them
+MIN_SHARE = 0.3  # share of the squares of the residuals from which a dependence is named
+MIN_POWER = 0.02  # share of the power of a dependence: with less left by the unknowns, it cannot be separated from them
 SCORE = 5.0  # standard deviations of a dependence beyond chance
 
 
@@ -48,14 +48,14 @@ def find_dependence(problem: FitProblem, e: np.ndarray, jacobian: np.ndarray) ->
     q, _ = np.linalg.qr(jacobian / (np.linalg.norm(jacobian, axis=0) + 1e-300))
     squares, best = float(e @ e), None
     for column, describe in candidate_columns(problem, e, jacobian):
-        own = column - q @ (q.T @ column)
-        power = float(own @ own)
-        if power <= ABSORBED * float(column @ column):
+        remainder = column - q @ (q.T @ column)
+        power = float(remainder @ remainder)
+        if power <= MIN_POWER * float(column @ column):
             continue
-        size = float(own @ e) / power
+        size = float(remainder @ e) / power
         share = size**2 * power / squares
-        independent = len(e) / correlation_length((e - size * own)[:, None])
-        if share < max(EXPLAINED, best.share if best else 0.0) or share * independent < SCORE**2 * (1 - share):
+        independent = len(e) / correlation_length((e - size * remainder)[:, None])
+        if share < max(MIN_SHARE, best.share if best else 0.0) or share * independent < SCORE**2 * (1 - share):
             continue
         best = Dependence(describe(-size), share, size * column)
     return best

@@ -20,16 +20,16 @@ from .fit_problem import FitProblem, Selection
 PART_SHARES, SURVIVORS, SOBOL_POINTS, SEARCH_SAMPLES = (0.15, 0.3, 0.55, 1.0), (40, 24, 12, 6), 2048, 250
 EVOLUTION = {"maxiter": 150, "tol": 1e-2}
 POPULATION = 10  # members of an evolution for each unknown, at least
-COMBINED = 4  # every so many searches, an evolution also starts from the minima found so far
+COMBINATION_PERIOD = 4  # every so many searches, an evolution also starts from the minima found so far
 SMALL_GAIN = 0.01  # relative reduction of the squares below which a minimum is not lower
 PATIENCE = 40  # generations without a lower minimum, after which an evolution ends
 NEAR_KNOWN = 1.2  # times the squares of the known minimum, at which an evolution has found it again
 REFUSED_COST = 1e12
 MAX_SEARCHES = 8
-REQUIRED, REQUIRED_IF_UNEXPLAINED = 2, 4  # searches that must find the same minimum
-EXPLAINED = 4.0  # standard errors of the squares of white noise: a minimum within them explains the records
-REQUIRED_AFTER = 2  # searches that find nothing lower than such a minimum
-REFINED = 4  # minima of a search that are refined
+REQUIRED_HITS, REQUIRED_HITS_IF_UNEXPLAINED = 2, 4  # searches that must find the same minimum
+WHITE_NOISE_MARGIN = 4.0  # standard errors of the squares of white noise: a minimum within them explains the records
+REQUIRED_SEARCHES = 2  # searches that find nothing lower than such a minimum
+REFINED_MINIMA = 4  # minima of a search that are refined
 ROUGH = 1.5  # times the noise: larger residuals ask for more searches
 DISTINCT = 0.02  # distance of coordinates from which minima are distinct
 
@@ -76,19 +76,21 @@ def search(
     """
     result, first, unit = SearchResult(), 0, problem.scatter**2
     n = sum(len(index) * record.y.shape[1] for index, record in zip(selection, problem.records, strict=True))
-    explained = unit * (n + EXPLAINED * np.sqrt(2 * n))
+    explained_squares = unit * (n + WHITE_NOISE_MARGIN * np.sqrt(2 * n))
     for number in range(1, MAX_SEARCHES + 1):
         report((number - 1) / MAX_SEARCHES)
         is_evolution = number % 2 == 0
-        initial_minima = result.minima if number % COMBINED == 0 else []
-        is_known = not initial_minima and ((result.best and result.best[0] < explained) or result.n_hits >= REQUIRED)
+        initial_minima = result.minima if number % COMBINATION_PERIOD == 0 else []
+        is_known = not initial_minima and (
+            (result.best and result.best[0] < explained_squares) or result.n_hits >= REQUIRED_HITS
+        )
         known_minimum = result.best[1] if result.best and is_known else None
         candidates = (
             evolve(problem, number, known_minimum, initial_minima)
             if is_evolution
             else continue_in_time(problem, number, starts)
         )
-        minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED]]
+        minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED_MINIMA]]
         result.minima += minima
         result.n_searches = number
         new = min(minima, key=lambda minimum: minimum[0], default=(np.inf, np.zeros(0)))
@@ -101,9 +103,9 @@ def search(
         elif not result.best or new[0] < result.best[0]:
             result.n_hits, first = 1, number
         result.best = new if not result.best or new[0] < result.best[0] else result.best
-        is_explained = result.best[0] < explained
-        is_confirmed = is_explained and number >= first + REQUIRED_AFTER
-        if is_confirmed or result.n_hits >= (REQUIRED if is_explained else REQUIRED_IF_UNEXPLAINED):
+        is_explained = result.best[0] < explained_squares
+        is_confirmed = is_explained and number >= first + REQUIRED_SEARCHES
+        if is_confirmed or result.n_hits >= (REQUIRED_HITS if is_explained else REQUIRED_HITS_IF_UNEXPLAINED):
             result.is_agreed = True
             break
     return result
@@ -111,11 +113,11 @@ def search(
 
 def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list[Minimum]:
     """Return the minima that remain of a Sobol set and the `starts` on growing parts of the records."""
-    parts, refused = growing_parts(problem), REFUSED_COST * problem.scatter
+    parts, refused_cost = growing_parts(problem), REFUSED_COST * problem.scatter
     points = np.vstack([starts, sobol_set(problem, seed, SOBOL_POINTS)])
     costs = np.array([absolute_cost(problem, z, parts[0]) for z in points])
-    order = [i for i in np.argsort(costs)[: SURVIVORS[0]] if costs[i] < refused]
-    order += [i for i in range(len(starts)) if i not in order and costs[i] < refused]
+    order = [i for i in np.argsort(costs)[: SURVIVORS[0]] if costs[i] < refused_cost]
+    order += [i for i in range(len(starts)) if i not in order and costs[i] < refused_cost]
     minima = [(float(costs[i]), points[i]) for i in order]
     for part, survivors in zip(parts, SURVIVORS, strict=True):
         minima = select_distinct([problem.minimize(z, part, 6, 1e-3) for _, z in minima], survivors)
@@ -190,9 +192,9 @@ def absolute_cost(problem: FitProblem, z: np.ndarray, selection: Selection) -> f
 
 def select_distinct(minima: list[Minimum], most: int) -> list[Minimum]:
     """Return the lowest minima that differ from each other."""
-    selected: list[Minimum] = []
+    distinct_minima: list[Minimum] = []
     for squares, z in sorted(minima, key=lambda minimum: minimum[0]):
-        is_new = all(np.abs(z - other).max() > DISTINCT for _, other in selected)
-        if np.isfinite(squares) and len(selected) < most and is_new:
-            selected.append((squares, z))
-    return selected
+        is_new = all(np.abs(z - other).max() > DISTINCT for _, other in distinct_minima)
+        if np.isfinite(squares) and len(distinct_minima) < most and is_new:
+            distinct_minima.append((squares, z))
+    return distinct_minima

@@ -26,13 +26,13 @@ def irregular_slips(records: Sequence[Samples], columns: Sequence[tuple[str, str
     columns : sequence of (str, str)
         Name and unit of each column of the records.
     """
-    measured = (
+    all_slips = (
         measure_slips(record, y, name, unit)
         for record in records
         for y, (name, unit) in zip(record.y.T, columns, strict=True)
         if unit in FORCES
     )
-    return tuple(slips for slips in measured if slips and slips.drop.std(ddof=1) > IRREGULAR * slips.drop.mean())
+    return tuple(slips for slips in all_slips if slips and slips.drop.std(ddof=1) > IRREGULAR * slips.drop.mean())
 
 
 def measure_slips(record: Samples, y: np.ndarray, column: str, unit: str) -> Slips | None:

@@ -169,7 +169,7 @@ class Sweep:
     def key(self) -> str:
         """Return a key that identifies the sweep."""
         run = self.runs.run.options | {"model": self.runs.run.model}  # the folder of the FMU does not matter
-        identity = [run, self.runs.varied, self.runs.measures, asdict(self.points), self.digest]
+        identity = [run, self.runs.varied_names, self.runs.measures, asdict(self.points), self.digest]
         return sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
 
     def checkpoint(self, folder: Path) -> Checkpoint:

@@ -91,7 +91,7 @@ def run_sweep(
     runs = SweepSpec(run, points.names, tuple(measures))
     about = describe(runs, points)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
-    folder = out / STUDY.name / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
+    folder = out / STUDY.name / (name or "-".join((runs.run.model, *runs.varied_names, sweep.key[:8])))
     source = describe_sources(str(file))
     options = runs.run.options | {
         "vary": {axis.name: str(axis) for axis in points.axes},
@@ -133,15 +133,17 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
     fmu_description = read_description(runs.run.fmu, runs.run.lenient)
     variables = {variable.name: variable for variable in fmu_description.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
-    check_varied("parameter to vary", runs.varied, settable, runs.run.values)
+    check_varied("parameter to vary", runs.varied_names, settable, runs.run.values)
     for axis in points.axes:
         if variables[axis.name].type not in REAL_TYPES and any(value % 1 for value in axis.values):
             raise SceneError(f"{axis.name} is an enumeration; vary it over integers or labels, as in {axis.name}=1,2")
     with open_runner(runs) as runner:
         columns = runner.columns
-    texts = {name: f"{variables[name].description or name}{describe_labels(variables[name])}" for name in runs.varied}
+    texts = {
+        name: f"{variables[name].description or name}{describe_labels(variables[name])}" for name in runs.varied_names
+    }
     varied = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
-    return SweepDescription(varied, columns, read_tables_with(runs.run.fmu, runs.varied, runs.run.values))
+    return SweepDescription(varied, columns, read_tables_with(runs.run.fmu, runs.varied_names, runs.run.values))
 
 
 def read_constants(sweep: Sweep, messages: dict[int, str]) -> tuple[dict[str, tuple[object, str]], float]:
@@ -153,7 +155,7 @@ def read_constants(sweep: Sweep, messages: dict[int, str]) -> tuple[dict[str, tu
     (point,) = sweep.points.coordinates(number, number + 1).tolist()
     with open_runner(sweep.runs) as runner:
         runner.run(point)
-        constants = {name: value for name, value in runner.constants().items() if name not in sweep.runs.varied}
+        constants = {name: value for name, value in runner.constants().items() if name not in sweep.runs.varied_names}
         return constants, runner.stop
 
 
@@ -171,7 +173,7 @@ def build_dataset(
 ) -> "xarray.Dataset":
     """Return the values and error messages of all runs."""
     library = import_optional("xarray", "a sweep", "sweep")
-    points, names = sweep.points, sweep.runs.varied
+    points, names = sweep.points, sweep.runs.varied_names
     is_grid = points.random is None
     dimensions = names if is_grid else ("run",)
     shape = tuple(len(axis.values) for axis in points.axes) if is_grid else (len(points),)
@@ -210,5 +212,7 @@ def group_failures(sweep: Sweep, messages: dict[int, str]) -> tuple[FailureGroup
     failures = []
     for runs in sorted(groups.values(), key=len, reverse=True):
         (point,) = sweep.points.coordinates(runs[0], runs[0] + 1).tolist()
-        failures.append(FailureGroup(len(runs), messages[runs[0]], dict(zip(sweep.runs.varied, point, strict=True))))
+        failures.append(
+            FailureGroup(len(runs), messages[runs[0]], dict(zip(sweep.runs.varied_names, point, strict=True)))
+        )
     return tuple(failures)
