@@ -58,18 +58,18 @@ def record_signal(number: int, frame: Any) -> None:
 @contextmanager
 def defer_signals() -> Iterator[None]:
     """Defer signals to the end of the block, for actions that must not stop halfway."""
-    handled = current_thread() is main_thread() and [
+    handled_signals = current_thread() is main_thread() and [
         number for number in SIGNALS if signal.getsignal(number) == handle_signal
     ]
     before = len(RECEIVED_SIGNALS)
-    for number in handled or ():
+    for number in handled_signals or ():
         signal.signal(number, record_signal)
     try:
         yield
     finally:
-        for number in handled or ():
+        for number in handled_signals or ():
             signal.signal(number, handle_signal)
-    if handled and len(RECEIVED_SIGNALS) > before:
+    if handled_signals and len(RECEIVED_SIGNALS) > before:
         raise KeyboardInterrupt
 
 

@@ -78,8 +78,8 @@ class WorkerDiedError(WorkerError):
 class WorkerStartError(WorkerError):
     """The process ended before its first call."""
 
-    def __init__(self, died: WorkerDiedError) -> None:
-        super().__init__(f"a worker process cannot start: {died}", died.messages)
+    def __init__(self, error: WorkerDiedError) -> None:
+        super().__init__(f"a worker process cannot start: {error}", error.messages)
 
 
 class WorkerProcess:
@@ -133,8 +133,8 @@ class WorkerProcess:
     def read_reply(self, reply: bytes | None) -> tuple[str, Any]:
         """Return kind and content of a reply; raise WorkerError if the process has ended."""
         if reply is None:
-            died = WorkerDiedError(self.wait(), self.read_output())
-            raise died if self.is_ready else WorkerStartError(died)
+            error = WorkerDiedError(self.wait(), self.read_output())
+            raise error if self.is_ready else WorkerStartError(error)
         kind, content = pickle.loads(reply)
         if kind == READY:
             self.is_ready = True

@@ -182,8 +182,8 @@ def describe_choice(column: Column, rivals: Sequence[Column], reason: str, optio
     if len(rivals) < 2:
         return []
     names = [part.heading for part in rivals]
-    listed = ", ".join(names) if len(names) <= MAX_LISTED else f"{', '.join(names[:MAX_LISTED])} and others"
-    return [f"Of {listed}, {column.heading} is used, because {reason}; {option_text(option)} selects another."]
+    headings_text = ", ".join(names) if len(names) <= MAX_LISTED else f"{', '.join(names[:MAX_LISTED])} and others"
+    return [f"Of {headings_text}, {column.heading} is used, because {reason}; {option_text(option)} selects another."]
 
 
 def find_time_columns(candidates: Sequence[Column]) -> list[Column]:
@@ -211,10 +211,10 @@ def describe_further_runs(candidates: Sequence[Column], time_column: Column, mot
     others = [f"{part.heading} with {signal.heading}" for part, signal in runs if part is not time_column]
     if not others:
         return []
-    selected = next(part for part, _ in runs if part is not time_column)
+    next_time_column = next(part for part, _ in runs if part is not time_column)
     return [
         f"The table has {len(others) + 1} runs side by side: {time_column.heading} with {motion_column.heading} is "
-        f"used, and {', '.join(others)} is not; {option_text('time', selected.heading)} selects "
+        f"used, and {', '.join(others)} is not; {option_text('time', next_time_column.heading)} selects "
         "another."
     ]
 
@@ -280,10 +280,12 @@ def parse_cells(cells: Cells) -> tuple[np.ndarray, int | None]:
     for index, cell in enumerate(cells):
         if cell.lower() in MISSING:
             continue
-        grouped = GROUPED_NUMBER.match(cell)
+        group_match = GROUPED_NUMBER.match(cell)
         number = cell
-        if grouped and (grouped[2] or grouped[3] or grouped[1] == "'" or (grouped[1] == "," and comma_groups)):
-            number = cell.replace(grouped[1], "")
+        if group_match and (
+            group_match[2] or group_match[3] or group_match[1] == "'" or (group_match[1] == "," and comma_groups)
+        ):
+            number = cell.replace(group_match[1], "")
         try:
             numbers[index] = float(EXPONENT.sub("e", number.replace(",", ".")))
         except ValueError:

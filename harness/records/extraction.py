@@ -44,10 +44,10 @@ def mark_missing_output(values: np.ndarray, name: str) -> list[str]:
     A value that most samples have is that at rest, not a mark: the speed of a body that sticks is often exactly 0.
     """
     notes = mark_sentinels(values, name)
-    marked = values.copy()
-    dropouts = mark_dropouts(marked, name)
-    if np.mean(np.isnan(marked) & ~np.isnan(values)) <= MAX_MISSING_SHARE:
-        values[:], notes = marked, notes + dropouts
+    marked_values = values.copy()
+    dropouts = mark_dropouts(marked_values, name)
+    if np.mean(np.isnan(marked_values) & ~np.isnan(values)) <= MAX_MISSING_SHARE:
+        values[:], notes = marked_values, notes + dropouts
     finite = values[np.isfinite(values)]
     for sign in (1.0, -1.0):
         is_saturated, peaks = find_saturated(sign * finite) if len(finite) else (finite, 0)
@@ -183,8 +183,11 @@ def extract(
     """
     t, label, notes = read_axis(table, axis, candidates, sources, options)
     values = {signal: parse_numbers(table, source.column.index).copy() for signal, source in sources.items()}
-    measured = [signal for signal, source in sources.items() if not source.is_input]
-    has_time, has_cells = np.isfinite(t), np.isfinite(t) & np.all([np.isfinite(values[x]) for x in measured], axis=0)
+    measured_signals = [signal for signal, source in sources.items() if not source.is_input]
+    has_time, has_cells = (
+        np.isfinite(t),
+        np.isfinite(t) & np.all([np.isfinite(values[x]) for x in measured_signals], axis=0),
+    )
     if axis.column:
         t = t.copy()
         notes += mark_sentinels(t, label)
@@ -194,17 +197,19 @@ def extract(
         rows_text = f"The last {tail} rows have" if tail > 1 else "The last row has"
         notes.append(f"{rows_text} a time and no signal, and {'are' if tail > 1 else 'is'} left out.")
     values = {signal: x[:length] for signal, x in values.items()}
-    for signal in measured:
+    for signal in measured_signals:
         notes += sources[signal].mark(values[signal], sources[signal].label)
     t, rounding = undo_time_rounding(t[:length])
     order, sorting = sort_rows(t)
     t, has_cells, values = t[order], has_cells[order], {signal: x[order] for signal, x in values.items()}
     begin, end = options.interval
     is_used = (t >= begin) & (t <= end) | ~np.isfinite(t)
-    is_complete = is_used & np.isfinite(t) & np.all([np.isfinite(values[signal]) for signal in measured], axis=0)
+    is_complete = (
+        is_used & np.isfinite(t) & np.all([np.isfinite(values[signal]) for signal in measured_signals], axis=0)
+    )
     n_used, n_complete, n_filled = (int(mask.sum()) for mask in (is_used, is_complete, is_used & has_cells))
     if n_used - n_complete > MAX_MISSING_SHARE * n_used or not length:
-        labels = [label] * bool(axis.column) + [sources[signal].label for signal in measured]
+        labels = [label] * bool(axis.column) + [sources[signal].label for signal in measured_signals]
         marks = notes[-1:] if n_complete < n_filled else []
         raise SceneError(
             f"{table.name}: {n_used - n_complete} of {n_used} rows have no number for {' or '.join(labels)}"
@@ -216,13 +221,13 @@ def extract(
     is_repeated, repetition = find_repeated_times(t[rows]) if has_times(axis) else (np.zeros(len(rows), bool), "")
     rows = rows[~is_repeated]
     notes += filter(None, [rounding, sorting, repetition])
-    columns = {signal: sources[signal].factor * values[signal][rows] for signal in measured}
+    columns = {signal: sources[signal].factor * values[signal][rows] for signal in measured_signals}
     samples = Samples(name, t[rows], columns, units, tuple(notes), table.line + 1 + order[rows])
     if not has_times(axis):
         return replace(samples, t=t[:0])
     for x in columns.values():
         check_samples(name, samples.t, x)
-    if len(measured) == len(sources):
+    if len(measured_signals) == len(sources):
         return samples
     part = slice(rows[0], rows[-1] + 1)  # from the first measured sample to the last
     inputs = {signal: source.factor * values[signal][part] for signal, source in sources.items() if source.is_input}
@@ -261,9 +266,9 @@ def read_axis(
 
 def sort_rows(t: np.ndarray) -> tuple[np.ndarray, str]:
     """Return the order of rows by their times t (n,), without those that have none if they must be sorted."""
-    timed = np.flatnonzero(np.isfinite(t))
-    order, note = sort_times(t[timed])
-    return (timed[order], note) if note else (np.arange(len(t)), "")
+    timed_rows = np.flatnonzero(np.isfinite(t))
+    order, note = sort_times(t[timed_rows])
+    return (timed_rows[order], note) if note else (np.arange(len(t)), "")
 
 
 def check_input(table: Table, signal: str, heading: str, t: np.ndarray, x: np.ndarray, rows: np.ndarray) -> None:
@@ -274,14 +279,14 @@ def check_input(table: Table, signal: str, heading: str, t: np.ndarray, x: np.nd
     """
     gaps = np.flatnonzero(~(np.isfinite(t) & np.isfinite(x)))
     if len(gaps):
-        lacking = "value" if np.isfinite(t[gaps[0]]) else "time"
+        quantity = "value" if np.isfinite(t[gaps[0]]) else "time"
         raise SceneError(
-            f"{table.name}: {heading}, the input {signal}, has no {lacking} in row {rows[gaps[0]]}: fill the gap, or "
+            f"{table.name}: {heading}, the input {signal}, has no {quantity} in row {rows[gaps[0]]}: fill the gap, or "
             f"select a part without gaps by {selection_text()}"
         )
-    doubled = np.flatnonzero((np.diff(t) == 0) & (np.diff(x) != 0))
-    if len(doubled):
+    conflicts = np.flatnonzero((np.diff(t) == 0) & (np.diff(x) != 0))
+    if len(conflicts):
         raise SceneError(
-            f"{table.name}: {heading}, the input {signal}, has two values at t = {t[doubled[0]]:.6g} s: keep one row "
+            f"{table.name}: {heading}, the input {signal}, has two values at t = {t[conflicts[0]]:.6g} s: keep one row "
             "for each time"
         )

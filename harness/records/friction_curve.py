@@ -68,8 +68,8 @@ def extract_curve(name: str, table: Table, options: ColumnOptions, columns: Curv
     candidates = list_columns(table)
     motion, motion_unit, is_position = find_motion(table, candidates, columns, options)
     axis = find_curve_axis(table, candidates, columns, options, motion)
-    taken = [column for column in (motion, axis.column) if column]
-    force, force_unit, is_current = find_force(table, candidates, columns, taken)
+    used_columns = [column for column in (motion, axis.column) if column]
+    force, force_unit, is_current = find_force(table, candidates, columns, used_columns)
     reason = rotation_reason(motion, force, force_unit, is_current, columns.constant)
     velocity_unit, motion_size, motion_notes = resolve_motion(motion, motion_unit, is_position, reason)
     if columns.constant is not None and not is_current:
@@ -100,9 +100,9 @@ def extract_curve(name: str, table: Table, options: ColumnOptions, columns: Curv
 
 def check_options(columns: CurveColumns) -> None:
     """Raise SceneError for options that exclude each other."""
-    for one, other in (("velocity", "position"), ("force", "current")):
-        if getattr(columns, one) is not None and getattr(columns, other) is not None:
-            raise SceneError(f"{one} and {other} are both given: leave one of them out")
+    for option, alternative in (("velocity", "position"), ("force", "current")):
+        if getattr(columns, option) is not None and getattr(columns, alternative) is not None:
+            raise SceneError(f"{option} and {alternative} are both given: leave one of them out")
     if columns.current is not None and columns.constant is None:
         example = option_text("constant", "0.12 N.m/A")
         raise SceneError(f"a current needs the constant of the motor, as in {example}")
@@ -149,13 +149,13 @@ def find_motion(
 
 
 def find_force(
-    table: Table, candidates: Sequence[Column], columns: CurveColumns, taken: Sequence[Column]
+    table: Table, candidates: Sequence[Column], columns: CurveColumns, used_columns: Sequence[Column]
 ) -> tuple[Column, str | None, bool]:
     """Return the column of forces or currents, its unit, and whether it has currents."""
     for heading, is_current in ((columns.force, False), (columns.current, True)):
         if heading is not None:
             return *find_column_and_unit(heading, table, list(candidates)), is_current
-    others = [part for part in candidates if all(part.index != column.index for column in taken)]
+    others = [part for part in candidates if all(part.index != column.index for column in used_columns)]
     by_unit = [part for part in others if part.unit and is_force_unit(part.unit)]
     by_unit.sort(key=lambda part: not FRICTION_NAME.search(part.name))  # friction before the other forces of a run
     by_name = [part for part in others if FORCE_NAME.search(part.name)]

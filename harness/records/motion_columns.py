@@ -125,18 +125,18 @@ def find_signal_column(
 
 def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str) -> tuple[int, str, float, str]:
     """Return the order, base unit and SI factor of a column, and a note on an assumption."""
-    requested = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
+    requested_order = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
     order_of_name = order_from_name(name)
     size, unit = (1.0, None) if unit is None else split_count(unit)
     assumption = f"is assumed to be a position; {option_text('quantity', 'velocity')} or acceleration overrides this."
     if unit is None:
-        order = requested if requested is not None else order_of_name or 0
+        order = requested_order if requested_order is not None else order_of_name or 0
         example, alternative = EXAMPLE_UNITS[order]
         note = (
             f"{name} has no unit in {file}: omega and zeta need none, the other values are in its own units, and "
             f"forces are left out; set it, as in {option_text('unit', example)} or {alternative}."
         )
-        if requested is None and order_of_name is None:
+        if requested_order is None and order_of_name is None:
             note += f" {name} {assumption}"
         return order, NO_UNIT, size, note
     if unit.lower() in COUNT_NAMES:
@@ -144,17 +144,22 @@ def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str)
         raise SceneError(f"{name} is in {unit}; set the size of one count, as in {example}")
     known_unit = find_unit(unit)
     if known_unit is None:
-        indicated = next((order for order in (requested, order_of_name) if order is not None), None)
-        order, rate = indicated or 0, RATE_SUFFIXES[indicated or 0]
+        indicated_order = next((order for order in (requested_order, order_of_name) if order is not None), None)
+        order, rate = indicated_order or 0, RATE_SUFFIXES[indicated_order or 0]
         base = unit.removesuffix(rate) if unit.endswith(rate) else f"{unit}.s{order if order > 1 else ''}"
-        return order, base, 1.0, f"{name} in {unit} {assumption}" if indicated is None else ""
-    order = known_unit.order if requested is None else requested
-    if requested is not None and requested != known_unit.order:
+        return order, base, 1.0, f"{name} in {unit} {assumption}" if indicated_order is None else ""
+    order = known_unit.order if requested_order is None else requested_order
+    if requested_order is not None and requested_order != known_unit.order:
         raise SceneError(
             f"{option_text('quantity', columns.quantity)}: {unit}, the unit of {name}, measures "
             f"{with_article(QUANTITIES[known_unit.order])}"
         )
-    if order_of_name is not None and known_unit.order < order_of_name and requested is None and columns.unit is None:
+    if (
+        order_of_name is not None
+        and known_unit.order < order_of_name
+        and requested_order is None
+        and columns.unit is None
+    ):
         raise SceneError(
             f"{name} has the name of {with_article(QUANTITIES[order_of_name])} and the unit of "
             f"{with_article(QUANTITIES[known_unit.order])}, {unit}: set {option_text('quantity')}, and "

@@ -122,16 +122,16 @@ def sort_times(t: np.ndarray) -> tuple[np.ndarray, str]:
 
     Rows of several runs, whose times overlap, keep their order, and so do rows with equal times.
     """
-    unchanged = np.arange(len(t))
+    unchanged_order = np.arange(len(t))
     falls = np.flatnonzero(np.diff(t) < 0)
     if not len(falls) or len(t) - len(np.unique(t)) > MAX_LATE_SHARE * len(t):
-        return unchanged, ""
+        return unchanged_order, ""
     parts = np.split(t, falls + 1)
     spans = sorted((float(part[0]), float(part[-1])) for part in parts)
     is_overlapping = any(later < end for (_, end), (later, _) in pairwise(spans))
     n_late = int((t < np.maximum.accumulate(t)).sum())  # rows that come after a row with a later time
     if is_overlapping and len(t) > MIN_RUN * len(parts) and n_late > MAX_LATE_SHARE * len(t):
-        return unchanged, ""
+        return unchanged_order, ""
     verb = "time falls" if len(falls) == 1 else "times fall"
     note = f"The rows are not in the order of time ({len(falls)} {verb}): they are sorted."
     return np.argsort(t, kind="stable"), note
@@ -146,11 +146,11 @@ def find_repeated_times(t: np.ndarray) -> tuple[np.ndarray, str]:
     times = np.unique(t[is_repeated])
     if not len(times) or is_repeated.sum() > MAX_REPEATED_SHARE * len(t):
         return np.zeros(len(t), bool), ""
-    listed = ", ".join(f"{time:.6g} s" for time in times[:MAX_LISTED_TIMES])
+    times_text = ", ".join(f"{time:.6g} s" for time in times[:MAX_LISTED_TIMES])
     more = f" and {len(times) - MAX_LISTED_TIMES} more" if len(times) > MAX_LISTED_TIMES else ""
     verb = "occurs" if len(times) == 1 else "occur"
     return is_repeated, (
-        f"The time{'s' * (len(times) > 1)} {listed}{more} {verb} more than once; the first sample is used, and "
+        f"The time{'s' * (len(times) > 1)} {times_text}{more} {verb} more than once; the first sample is used, and "
         f"{int(is_repeated.sum())} of {len(t)} samples are left out."
     )
 

@@ -27,12 +27,12 @@ def check_size(size: float, name: str) -> None:
 
 def unpack_gzip(data: bytes, name: str) -> bytes:
     """Return the contents of a .gz file."""
-    unpacked = bytearray()
+    contents = bytearray()
     with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
         while chunk := file.read(CHUNK):
-            unpacked += chunk
-            check_size(len(unpacked), name)
-    return bytes(unpacked)
+            contents += chunk
+            check_size(len(contents), name)
+    return bytes(contents)
 
 
 def check_zip(archive: ZipFile, name: str) -> None:
@@ -54,9 +54,9 @@ def check_mat(data: bytes, name: str) -> None:
     while position + 8 <= len(data):
         kind, length = struct.unpack_from(f"{order}II", data, position)
         if kind == MAT_COMPRESSED:
-            unpacker, packed = zlib.decompressobj(), data[position + 8 : position + 8 + length]
-            while packed:
-                chunk = unpacker.decompress(packed, CHUNK)
-                size, packed = size + len(chunk), unpacker.unconsumed_tail if chunk else b""
+            unpacker, compressed_data = zlib.decompressobj(), data[position + 8 : position + 8 + length]
+            while compressed_data:
+                chunk = unpacker.decompress(compressed_data, CHUNK)
+                size, compressed_data = size + len(chunk), unpacker.unconsumed_tail if chunk else b""
                 check_size(size, name)
         position += 8 + length

@@ -183,9 +183,11 @@ def find_member(names: list[str], name: str) -> str | None:
     ]
     raw = [member for member in tables if Path(member).stem.lower() == "raw data"]
     if len(tables) != 1 and len(raw) != 1:
-        listed = f"with {len(tables)} tables ({', '.join(tables[:5])})" if tables else "without a table (.csv, .txt)"
+        tables_text = (
+            f"with {len(tables)} tables ({', '.join(tables[:5])})" if tables else "without a table (.csv, .txt)"
+        )
         example = f": unpack it and specify a file in it, as in {format_value(tables[0])}" if tables else ""
-        raise SceneError(f"{name} is an archive {listed}{example}")
+        raise SceneError(f"{name} is an archive {tables_text}{example}")
     return tables[0] if len(tables) == 1 else raw[0]
 
 
@@ -225,11 +227,11 @@ def table_from_columns(columns: list[array_files.ArrayColumn], names: list[str],
     """Return a table from the columns of the most frequent length; `names` are those of all entries of the file."""
     lengths = [len(column.values) for column in columns if len(column.values) > 2]
     length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
-    selected = [column for column in columns if len(column.values) == length]
-    if not selected:
+    selected_columns = [column for column in columns if len(column.values) == length]
+    if not selected_columns:
         raise SceneError(f"{name} has no array of numbers (it has {', '.join(names) or 'none'})")
-    parents = {column.name.rpartition(".")[0] for column in selected}
+    parents = {column.name.rpartition(".")[0] for column in selected_columns}
     prefix = f"{parents.pop()}." if len(parents) == 1 else ""
-    headings = tuple(column.heading(prefix) for column in selected)
-    cells = (column.values for column in selected)
+    headings = tuple(column.heading(prefix) for column in selected_columns)
+    cells = (column.values for column in selected_columns)
     return Table(name, headings, tuple(c if isinstance(c[0], str) else np.asarray(c, float) for c in cells))

@@ -198,13 +198,13 @@ def join_units(cells: list[str]) -> list[str]:
     """Return cells in which a number and the unit after it, as in 0.1 sec, are one cell."""
     if not any(cell[0].isalpha() for cell in cells) or not any(map(NUMBER.match, cells)):
         return cells
-    joined: list[str] = []
+    joined_cells: list[str] = []
     for cell in cells:
-        if joined and cell[0].isalpha() and NUMBER.match(joined[-1]) and is_unit(cell):
-            joined[-1] = f"{joined[-1]} {cell}"
+        if joined_cells and cell[0].isalpha() and NUMBER.match(joined_cells[-1]) and is_unit(cell):
+            joined_cells[-1] = f"{joined_cells[-1]} {cell}"
         else:
-            joined.append(cell)
-    return joined
+            joined_cells.append(cell)
+    return joined_cells
 
 
 def find_delimiter(lines: list[str]) -> str:
@@ -262,25 +262,27 @@ def find_first_number_row(rows: list[list[str]], min_width: int = 2) -> int | No
                 len(row) == width and count_numbers(row, min_width) > 0 and is_number(row[column])
                 for row in chain(rows, rows[-1:])
             )
-            return next((i for i, both in enumerate(pairwise(is_numeric)) if all(both)), None)
+            return next((i for i, pair in enumerate(pairwise(is_numeric)) if all(pair)), None)
     return None
 
 
-def find_headings(preceding: list[list[str]], width: int) -> list[str]:
+def find_headings(preceding_rows: list[list[str]], width: int) -> list[str]:
     """Return the headings above the numbers: the last row of that width, or two rows if the second has units.
 
     A row with fewer names, one of them that of a time, names the first columns.
     """
-    while preceding and all(cell.lower() in MISSING for cell in preceding[-1]):
-        preceding = preceding[:-1]  # empty rows belong to the numbers
-    candidates = [row for row in preceding[-3:] if abs(len(row) - width) <= (len(row) > 1) or names_a_part(row, width)]
+    while preceding_rows and all(cell.lower() in MISSING for cell in preceding_rows[-1]):
+        preceding_rows = preceding_rows[:-1]  # empty rows belong to the numbers
+    candidates = [
+        row for row in preceding_rows[-3:] if abs(len(row) - width) <= (len(row) > 1) or names_a_part(row, width)
+    ]
     candidates = [pad(row, width) for row in candidates if not all(is_number(cell) for cell in row if cell)]
-    if not candidates or candidates[-1] != pad(preceding[-1], width):
+    if not candidates or candidates[-1] != pad(preceding_rows[-1], width):
         return []
     last = candidates[-1]
     if len(candidates) > 1 and all(map(looks_like_unit, last)) and not all(map(looks_like_unit, candidates[-2])):
         last = add_units(candidates[-2], last)
-    labels = next((row[1:] for row in preceding if row and row[0].lower() == UNITS_ROW), [])
+    labels = next((row[1:] for row in preceding_rows if row and row[0].lower() == UNITS_ROW), [])
     return add_units(last, ["", *labels, *[""] * width][:width])
 
 
@@ -312,17 +314,17 @@ def has_bracketed_unit(heading: str) -> bool:
 
 def looks_like_unit(cell: str) -> bool:
     """Return whether a cell below a heading is a unit: in brackets, known, or empty."""
-    bracketed = cell.startswith(("[", "(")) and cell.endswith(("]", ")"))
-    return bracketed or not cell or is_unit(cell) or cell in (*COUNT_NAMES, "1") or unit_size(cell) is not None
+    is_bracketed = cell.startswith(("[", "(")) and cell.endswith(("]", ")"))
+    return is_bracketed or not cell or is_unit(cell) or cell in (*COUNT_NAMES, "1") or unit_size(cell) is not None
 
 
-def find_commented_headings(preceding: list[str], delimiter: str, width: int) -> list[str]:
+def find_commented_headings(preceding_lines: list[str], delimiter: str, width: int) -> list[str]:
     """Return the headings in the comments before the numbers.
 
     These are the cells of the comment with one cell for each column, among them a time, and the most known names and
     units; otherwise those of the last comment.
     """
-    comments = [strip_comment(line) for line in preceding if is_comment(line) and not UNITS_LINE.match(line)]
+    comments = [strip_comment(line) for line in preceding_lines if is_comment(line) and not UNITS_LINE.match(line)]
     comments = [comment for comment in comments[-SAMPLE_LINES:] if len(comment) <= MAX_LINE_LENGTH]
     best: tuple[int, list[str]] = (0, [])
     for mark in dict.fromkeys((delimiter, *DELIMITERS)):
@@ -354,9 +356,9 @@ def strip_comment(line: str) -> str:
     return line.lstrip().lstrip("#%/ ").rstrip()
 
 
-def find_units_line(preceding: list[str], delimiter: str, width: int) -> list[str]:
+def find_units_line(preceding_lines: list[str], delimiter: str, width: int) -> list[str]:
     """Return the units in a line such as `% Units: s, mm`, one for each column; none if there is no such line."""
-    texts = [match[1] for match in map(UNITS_LINE.match, preceding) if match and len(match[1]) <= MAX_LINE_LENGTH]
+    texts = [match[1] for match in map(UNITS_LINE.match, preceding_lines) if match and len(match[1]) <= MAX_LINE_LENGTH]
     for mark in dict.fromkeys((delimiter, *DELIMITERS)):
         for row in (row for text in reversed(texts) for row in split_cells([text], mark, "the file")):
             if len(row) == width:
@@ -364,9 +366,9 @@ def find_units_line(preceding: list[str], delimiter: str, width: int) -> list[st
     return []
 
 
-def find_interval(preceding: list[list[str]]) -> float | None:
+def find_interval(preceding_rows: list[list[str]]) -> float | None:
     """Return the sampling interval in s in the rows before the numbers, or None."""
-    for row in preceding:
+    for row in preceding_rows:
         if len(row) > 1 and row[0].lower() == INTERVAL_ROW and NUMBER.match(row[1]):
             return float(row[1].replace(",", "."))
     return None

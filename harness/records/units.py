@@ -34,10 +34,10 @@ def split_heading(heading: str) -> tuple[str, str | None]:
     parts = name.rsplit(None, 2)  # x / mm, x in mm
     if len(parts) == 3 and parts[1] in ("/", "in") and (is_unit(parts[2]) or unit_size(parts[2])):
         return parts[0], parts[2]
-    bracketed = BRACKETS.search(name)  # followed by a run, as in x (mm) Run #1
-    if bracketed and is_unit(bracketed[1]):
-        around = name[: bracketed.start()].rstrip(), name[bracketed.end() :].lstrip()
-        return " ".join(filter(None, around)), bracketed[1].strip()
+    bracket_match = BRACKETS.search(name)  # followed by a run, as in x (mm) Run #1
+    if bracket_match and is_unit(bracket_match[1]):
+        around = name[: bracket_match.start()].rstrip(), name[bracket_match.end() :].lstrip()
+        return " ".join(filter(None, around)), bracket_match[1].strip()
     words = WORD_BOUNDARY.split(name)
     for i in range(max(len(words) - MAX_UNIT_WORDS, 1), len(words)):
         stem, suffix = " ".join(words[:i]).strip(), "/".join(words[i:]).strip()
@@ -92,7 +92,7 @@ CHARACTER_SUBSTITUTES = str.maketrans("º˚µμ²³⁻¹·*", "°°uu23-1  ", "^
 POUND = 0.45359237  # kg
 Powers = dict[str, int]  # powers of the base units kg, m, s, A and K, and of cycles
 PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "m": 1e-3, "u": 1e-6, "n": 1e-9, "c": 1e-2, "d": 1e-1}
-NAMED: dict[str, tuple[float, Powers]] = {
+NAMED_UNITS: dict[str, tuple[float, Powers]] = {
     **{name: (size, {"m": 1}) for name, size in LENGTHS.items()},
     **{name: (size, {"s": 1}) for name, size in TIMES.items()},
     **{name: (size, {}) for name, size in ANGLES.items()},
@@ -103,7 +103,7 @@ NAMED: dict[str, tuple[float, Powers]] = {
     "Hz": (1.0, {"cycle": 1, "s": -1}),
     "%": (0.01, {}),
 }
-PREFIXED: dict[str, tuple[float, Powers]] = {
+PREFIXED_UNITS: dict[str, tuple[float, Powers]] = {
     "g": (1e-3, {"kg": 1}),
     "m": (1.0, {"m": 1}),
     "s": (1.0, {"s": 1}),
@@ -234,10 +234,10 @@ def is_force_unit(unit: str) -> bool:
 
 def named_unit(name: str) -> tuple[float, Powers] | None:
     """Return a unit of one word, with a prefix or without."""
-    if name in NAMED:
-        return NAMED[name]
+    if name in NAMED_UNITS:
+        return NAMED_UNITS[name]
     for prefix, factor in PREFIXES.items():
-        unit = PREFIXED.get(name.removeprefix(prefix)) if name.startswith(prefix) else None
+        unit = PREFIXED_UNITS.get(name.removeprefix(prefix)) if name.startswith(prefix) else None
         if unit:
             return factor * unit[0], unit[1]
     return None
@@ -251,8 +251,8 @@ def conversion_factor(unit: str, other: str) -> float | None:
     factors = unit_factors(unit)
     if unit == other or (factors is not None and factors == unit_factors(other)):
         return 1.0
-    one, two = unit_size(unit), unit_size(other)
-    return one[0] / two[0] if one and two and one[1] == two[1] else None
+    size, other_size = unit_size(unit), unit_size(other)
+    return size[0] / other_size[0] if size and other_size and size[1] == other_size[1] else None
 
 
 @cache

@@ -76,8 +76,8 @@ def write_reference(path: Path, headings: list[str], reference: Solution) -> Cer
 
 def list_states(model: type) -> list[tuple[str, str]]:
     """Return name and unit of each state that the solver integrates, in order."""
-    declared = [value for cls in model.__mro__ for value in vars(cls).values() if getattr(value, "role", "") == "state"]
-    return [(state.name, state.unit) for state in declared if not state.rate]
+    states = [value for cls in model.__mro__ for value in vars(cls).values() if getattr(value, "role", "") == "state"]
+    return [(state.name, state.unit) for state in states if not state.rate]
 
 
 def compute_by_two_methods(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> Solution:
@@ -133,8 +133,8 @@ def solve_by_two_methods(
     HarnessError
         If the FMU does not offer both methods, or they disagree on the motion, or with a thirtieth of the largest step.
     """
-    if missing := METHODS.keys() - method_numbers(model):
-        methods = ", ".join(sorted(missing))
+    if missing_methods := METHODS.keys() - method_numbers(model):
+        methods = ", ".join(sorted(missing_methods))
         raise HarnessError(f"{file.with_suffix('.fmu')} does not offer {methods}: build it without --method")
     times = np.linspace(0.0, model.stop_time, POINTS).tolist() if times is None else times
     tolerance = METHODS["dop853"]
@@ -142,7 +142,7 @@ def solve_by_two_methods(
     runs.append(EmbeddedModel.create(model, values or {}, "dop853", tolerance, h_max=LARGEST_STEP * times[-1]))
     solution, other, fine = (run.solve(times, TIMEOUT) for run in runs)
     methods = " and ".join(METHODS)
-    difference, fine_difference = (max_relative_difference(solution, one) for one in (other, fine))
+    difference, fine_difference = (max_relative_difference(solution, comparison) for comparison in (other, fine))
     if not difference <= AGREEMENT_TOLERANCE:
         raise HarnessError(
             f"{file.name}: {methods} differ by {difference:.1e}, more than {AGREEMENT_TOLERANCE:g}, so the result is "
@@ -156,7 +156,7 @@ def solve_by_two_methods(
         )
     reference = replace(solution, method=methods, estimated_error=max(difference, fine_difference))
     events = solution.events or []
-    has_same_events = all(not isnan(event_time_error(events, one.events or [])) for one in (other, fine))
+    has_same_events = all(not isnan(event_time_error(events, comparison.events or [])) for comparison in (other, fine))
     if not has_same_events or len({run.run.events.count for run in runs}) > 1:
         return replace(reference, events=None, start_mode=None)
     return replace(reference, events=events)

@@ -121,10 +121,10 @@ def threshold_segments(s: SpringMassSystem, eps: float, stop: float) -> Iterator
         duration = (s.hold - s.load(x, s.u * t)) / (s.k * (s.u - v))
         t, x = t + duration, x + v * duration
         if v < level:
-            accelerating = sliding_motion(s, x, v, s.load(x, s.u * t) - s.hold)
-            yield Segment(t, 0, shift_time(accelerating, t))
+            accelerated_motion = sliding_motion(s, x, v, s.load(x, s.u * t) - s.hold)
+            yield Segment(t, 0, shift_time(accelerated_motion, t))
             duration = mp.acos((s.u - level) / (s.u - v)) / mp.sqrt(s.k / s.m)  # v = u - (u - v0) cos(w s)
-            t, x = t + duration, accelerating(duration)[0]
+            t, x = t + duration, accelerated_motion(duration)[0]
         net = s.load(x, s.u * t) - s.slide
         slip = sliding_motion(s, x, level, net)
         yield Segment(t, 1, shift_time(slip, t))
