@@ -36,7 +36,7 @@ class DerivativeRuns:
         folder = unpack_once(spec.fmu)
         self.folder, self.n_runs, self.is_slow = Path(folder), 0, False
         self.instance: FmuInstance | None = None
-        self.prepared: dict[int, tuple[RunSpec, VariationalRun]] = {}
+        self.prepared_runs: dict[int, tuple[RunSpec, VariationalRun]] = {}
         description = read_leniently(folder)
         variables = {variable.name: variable for variable in description.modelVariables}
         outputs = [*(unknown.variable for unknown in description.outputs), *state_variables(description)]
@@ -66,18 +66,18 @@ class DerivativeRuns:
             self.is_slow = run.run.n_steps >= MAX_STEPS
             return None
         slopes = np.where(np.isnan(solution.left), solution.right, solution.left)
-        is_complete = all(item.is_moment for item in solution.undefined) and np.isfinite(slopes).all()
+        is_complete = all(item.is_moment for item in solution.undefined_derivatives) and np.isfinite(slopes).all()
         return (solution.values, slopes) if is_complete else None
 
     def prepare(self, spec: RunSpec, names: Sequence[str], values: Mapping[str, float]) -> VariationalRun:
         """Return a run with other values; what it needs is prepared once for each specification."""
-        if id(spec) not in self.prepared:
-            if len(self.prepared) >= MAX_PREPARED:
-                self.prepared.clear()
+        if id(spec) not in self.prepared_runs:
+            if len(self.prepared_runs) >= MAX_PREPARED:
+                self.prepared_runs.clear()
             assert self.instance is not None
             run = VariationalRun(self.instance, self.folder, replace(spec, tolerance=RTOL), names, MAX_STEPS)
-            self.prepared[id(spec)] = spec, run  # the specification is kept, because it is known by its address
-        run = self.prepared[id(spec)][1]
+            self.prepared_runs[id(spec)] = spec, run  # the specification is kept, because it is known by its address
+        run = self.prepared_runs[id(spec)][1]
         run.change_values(values)
         return run
 

@@ -138,15 +138,15 @@ class EmbeddedModel:
         """
         instance = model()
         run = create_run(instance)
-        attributes = {getattr(declared, "element", ""): name for name, declared in vars(model).items()}
+        attributes = {getattr(declaration, "element", ""): name for name, declaration in vars(model).items()}
         for name, value in values.items():
             setattr(instance, attributes.get(name, name), value)
         run.solver.rtol, run.solver.atol, run.solver.h_max = rtol, atol, h_max
         if method:
             run.solver.method = method_numbers(model)[method]
-        violated = instance.prepare() or run.solver.check_method(instance)
-        if violated:
-            raise HarnessError(instance.rules[violated].format_map(vars(instance)))
+        violated_rule = instance.prepare() or run.solver.check_method(instance)
+        if violated_rule:
+            raise HarnessError(instance.rules[violated_rule].format_map(vars(instance)))
         return cls(instance, run)
 
     def start_run(self, stop: float) -> None:

@@ -27,8 +27,8 @@ PERIODIC, CHANGING, COUNTDOWN, TRIGGERED = ("constant", "fixed", "tunable"), "ch
 def update_discrete_states(update: Callable[[], tuple[bool, bool, bool, bool, bool, float]], t: float) -> float:
     """Iterate the discrete states at an event; return the time of the next event in s, inf if there is none."""
     for _ in range(MAX_EVENTS):
-        needs_update, terminated, _, _, is_defined, next_event = update()
-        if terminated:
+        needs_update, is_terminated, _, _, is_defined, next_event = update()
+        if is_terminated:
             raise TerminatedError(t, "it returned terminateSimulation from an event")
         if is_defined and not next_event >= t:
             raise HarnessError(f"it sets its next event to {next_event:.9g} s, at t = {t:.9g} s")
@@ -53,11 +53,11 @@ def check_clocks(description: Any, exchange: bool, lenient: bool) -> None:
     if not exchange and not description.coSimulation.hasEventMode:
         other = f"use {option_text('interface', 'ModelExchange')}, or, " if description.modelExchange else ""
         raise HarnessError(f"{description.modelName} has clocks ({names}), but no event mode; {other}{remedy}")
-    triggered = [
+    triggered_clocks = [
         clock.name for clock in clocks if clock.causality == "input" and clock.intervalVariability == TRIGGERED
     ]
-    if triggered:
-        clocks_text = f"triggered input clocks ({', '.join(triggered)})"
+    if triggered_clocks:
+        clocks_text = f"triggered input clocks ({', '.join(triggered_clocks)})"
         raise HarnessError(f"{description.modelName} has {clocks_text}, which only another FMU can tick; {remedy}")
 
 
@@ -128,10 +128,12 @@ class Clocks:
             if clock.causality == "input" and clock.intervalVariability in kinds
         ]
         root = etree.parse(str(Path(folder) / DESCRIPTION_FILE)).getroot()
-        declared = {int(clock.get("valueReference")): clock.attrib for clock in root.iterfind("ModelVariables/Clock")}
+        declarations = {
+            int(clock.get("valueReference")): clock.attrib for clock in root.iterfind("ModelVariables/Clock")
+        }
         for clock in self.inputs:
             if clock.kind in PERIODIC:
-                interval, shift = self.read_period(clock, declared[clock.reference])
+                interval, shift = self.read_period(clock, declarations[clock.reference])
                 if not 0.0 < interval < inf:
                     raise HarnessError(f"its clock {clock.name} has an interval of {interval!r} s; it must be positive")
                 clock.base, clock.interval = start + shift, interval
@@ -151,13 +153,15 @@ class Clocks:
         """Return the time of the next tick if that is before a target in s, and else the target."""
         return target if abs(self.next_tick - target) <= self.tolerance else min(target, self.next_tick)
 
-    def read_period(self, clock: InputClock, declared: Any) -> tuple[float, float]:
+    def read_period(self, clock: InputClock, declaration: Any) -> tuple[float, float]:
         """Return interval and shift of a periodic clock in s, as declared, or else as the FMU states."""
-        resolution = float(declared.get("resolution", 1))
-        if declared.get("intervalDecimal") is not None:
-            return float(declared["intervalDecimal"]), float(declared.get("shiftDecimal", 0.0))
-        if declared.get("intervalCounter") is not None:
-            return int(declared["intervalCounter"]) / resolution, int(declared.get("shiftCounter", 0)) / resolution
+        resolution = float(declaration.get("resolution", 1))
+        if declaration.get("intervalDecimal") is not None:
+            return float(declaration["intervalDecimal"]), float(declaration.get("shiftDecimal", 0.0))
+        if declaration.get("intervalCounter") is not None:
+            return int(declaration["intervalCounter"]) / resolution, int(
+                declaration.get("shiftCounter", 0)
+            ) / resolution
         shift = (c_double * 1)()
         fmu = self.instance.fmu  # older versions of fmpy have methods for clocks that fail
         fmu.fmi3GetShiftDecimal(fmu.component, (c_uint * 1)(clock.reference), 1, shift)

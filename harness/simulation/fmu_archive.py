@@ -88,13 +88,13 @@ def validate_description(path: Path, lenient: bool) -> Any:
             mark_exclusive_bounds(description, path)
     except ValidationError as error:
         violations = [" ".join(fault.split()) for fault in error.problems]
-        listed = "\n- ".join(
+        list_text = "\n- ".join(
             violations[:MAX_LISTED_FAULTS]
             + [f"and {len(violations) - MAX_LISTED_FAULTS} more"] * (len(violations) > MAX_LISTED_FAULTS)
         )
         count = "1 place" if len(violations) == 1 else f"{len(violations)} places"
         raise HarnessError(
-            f"{path.name} violates the FMI standard in {count}:\n- {listed}\nto try to run it, {describe_lenient()}"
+            f"{path.name} violates the FMI standard in {count}:\n- {list_text}\nto try to run it, {describe_lenient()}"
         ) from None
     except (AttributeError, IndexError, TypeError) as error:  # fmpy reads elements and attributes that are missing
         problem = f"its modelDescription.xml lacks a required element or the FMI version ({first_line(error)})"
@@ -135,10 +135,10 @@ def read_leniently(path: Path) -> Any:
                 file = stack.enter_context(stack.enter_context(ZipFile(path)).open(DESCRIPTION_FILE))
             tree = etree.parse(file)
             repair_description(tree.getroot())
-            repaired = stack.enter_context(temporary_directory("xml-")) / DESCRIPTION_FILE
-            tree.write(str(repaired))
+            repaired_file = stack.enter_context(temporary_directory("xml-")) / DESCRIPTION_FILE
+            tree.write(str(repaired_file))
             try:
-                return fmpy.read_model_description(str(repaired), validate=False)
+                return fmpy.read_model_description(str(repaired_file), validate=False)
             except Exception:
                 raise error from None  # of the file as it is
 
@@ -168,12 +168,12 @@ def repair_description(root: Any) -> None:
             variable.insert(0, etree.Element("String"))
             variable.set("causality", "local")
     references = {variable.get("valueReference") for variable in variables}
-    defined = references if version.startswith("3.") else {str(i + 1) for i in range(len(variables))}
+    defined_references = references if version.startswith("3.") else {str(i + 1) for i in range(len(variables))}
     for element in variables.iter():
         if element.get("declaredType") not in types:
             del element.attrib["declaredType"]
         for name in "derivative", "clocks":
-            if not defined.issuperset(element.get(name, "").split()):
+            if not defined_references.issuperset(element.get(name, "").split()):
                 del element.attrib[name]
     for variable in variables:
         if variable.get("initial") is None:  # its default is defined for the combinations that the standard allows
@@ -181,9 +181,9 @@ def repair_description(root: Any) -> None:
             if variability not in VARIABILITIES.get(causality, ()):
                 variable.set("initial", "exact" if causality in SET_CAUSALITIES else "calculated")
     for unknown in root.findall("ModelStructure//*[@index]") + root.findall("ModelStructure/*[@valueReference]"):
-        if (unknown.get("index") or unknown.get("valueReference")) not in defined:
+        if (unknown.get("index") or unknown.get("valueReference")) not in defined_references:
             unknown.getparent().remove(unknown)
-        elif not defined.issuperset(unknown.get("dependencies", "").split()):
+        elif not defined_references.issuperset(unknown.get("dependencies", "").split()):
             del unknown.attrib["dependencies"]
             unknown.attrib.pop("dependenciesKind", None)
 
@@ -289,5 +289,5 @@ def check_python_fmu(fmu: Path, directory: Path) -> None:
     name_file = directory / "resources" / SCRIPT_NAME_FILE
     script = name_file.read_text(encoding="utf-8", errors="replace").split("\n")[0] if name_file.is_file() else ""
     if not script or not (name_file.parent / f"{script}.py").is_file():
-        missing = f"resources/{script}.py" if script else f"resources/{SCRIPT_NAME_FILE}"
-        raise HarnessError(f"{fmu.name} lacks {missing}, without which a Python FMU crashes: build it again")
+        missing_file = f"resources/{script}.py" if script else f"resources/{SCRIPT_NAME_FILE}"
+        raise HarnessError(f"{fmu.name} lacks {missing_file}, without which a Python FMU crashes: build it again")

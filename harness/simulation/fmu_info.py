@@ -41,8 +41,8 @@ def read_info(model: str) -> FmuInfo:
         variable.name: int(variable.start) if variable.name in choices else float(variable.start)
         for variable in settable
     }
-    fixed = read_model_data(fmu).fixed_choices
-    choices |= {name: {label: number} for name, (label, number) in fixed.items()}
+    fixed_choices = read_model_data(fmu).fixed_choices
+    choices |= {name: {label: number} for name, (label, number) in fixed_choices.items()}
     methods = {number: label for label, number in choices[METHOD].items()}
-    default = methods[fixed[METHOD][1] if METHOD in fixed else int(defaults[METHOD])]
+    default = methods[fixed_choices[METHOD][1] if METHOD in fixed_choices else int(defaults[METHOD])]
     return FmuInfo(tuple(methods.values()), default, defaults, choices, float(description.defaultExperiment.stopTime))

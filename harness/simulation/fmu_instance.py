@@ -64,9 +64,9 @@ class LogCapture:
     @property
     def error_message(self) -> str:
         """Return the last message above a warning, or the last line on standard error; empty if there is none."""
-        logged = [text for status, text in self.messages if status > WARNING and text.strip()]
-        printed = self.stderr.getvalue().strip().splitlines() if self.stderr else []
-        return " ".join((logged or printed or [""])[-1].split())
+        logged_errors = [text for status, text in self.messages if status > WARNING and text.strip()]
+        printed_lines = self.stderr.getvalue().strip().splitlines() if self.stderr else []
+        return " ".join((logged_errors or printed_lines or [""])[-1].split())
 
     def clear(self) -> None:
         """Discard all messages."""
@@ -172,11 +172,11 @@ class FmuInstance:
         which takes as long as the call itself.
         """
         name, types = f"{self.prefix}{name}", self.function(name).argtypes
-        converted = (
+        converted_arguments = (
             kind(value) if isinstance(value, int | float) else value
             for kind, value in zip(types, (self.component, *arguments), strict=True)
         )
-        return name, self.fmu.dll[name], tuple(converted)
+        return name, self.fmu.dll[name], tuple(converted_arguments)
 
     def initialize(
         self, values: Iterable[tuple[Any, Any]], start: float, stop: float | None, tolerance: float | None = None
@@ -250,12 +250,12 @@ class FmuInstance:
         name = f"{self.prefix}DoStep"
         if status != DISCARD:
             return FMICallException(name, status)
-        terminated, last_time = False, None
+        is_terminated, last_time = False, None
         if self.is_fmi2:
             with suppress(FMICallException):  # these queries are optional
-                terminated = self.fmu.getBooleanStatus(fmi2Terminated)
+                is_terminated = self.fmu.getBooleanStatus(fmi2Terminated)
                 last_time = self.fmu.getRealStatus(fmi2LastSuccessfulTime)
-        if terminated:
+        if is_terminated:
             return TerminatedError(last_time, f"{name} returned Discard with fmi2Terminated")
         return StepRefusedError(f"{name} returned Discard for a step of {h:.4g} s at t = {t:.9g} s")
 
@@ -335,12 +335,12 @@ def capture_stderr() -> Iterator[io.StringIO]:
 
     The log contains the same messages.
     """
-    captured = io.StringIO()
-    with ExitStack() as restore, redirect_stderr(captured):
+    buffer = io.StringIO()
+    with ExitStack() as restore, redirect_stderr(buffer):
         with suppress(OSError):  # there is no standard error
-            saved = os.dup(2)
-            restore.callback(os.close, saved)
-            restore.callback(os.dup2, saved, 2)
+            stderr_copy = os.dup(2)
+            restore.callback(os.close, stderr_copy)
+            restore.callback(os.dup2, stderr_copy, 2)
             with open(os.devnull, "w") as null:
                 os.dup2(null.fileno(), 2)
-        yield captured
+        yield buffer

@@ -194,8 +194,8 @@ class FmuDescription:
         return format_html(self.blocks())
 
     def _choices(self, name: str) -> tuple[str, ...]:
-        fixed = (self.fixed[name],) if name in self.fixed else ()
-        return next((variable.choices for variable in self.variables if variable.name == name), fixed)
+        fixed_choices = (self.fixed[name],) if name in self.fixed else ()
+        return next((variable.choices for variable in self.variables if variable.name == name), fixed_choices)
 
 
 def describe_fmu(path: Path) -> FmuDescription:
@@ -208,12 +208,12 @@ def describe_fmu(path: Path) -> FmuDescription:
     """
     content, data = read_description(path, lenient=True), read_model_data(path)
     experiment = content.defaultExperiment
-    offered = ((CO_SIMULATION, content.coSimulation), (MODEL_EXCHANGE, content.modelExchange))
+    interfaces = ((CO_SIMULATION, content.coSimulation), (MODEL_EXCHANGE, content.modelExchange))
     return FmuDescription(
         name=content.modelName,
         description=(content.description or "").rstrip("."),
         fmi_version=content.fmiVersion,
-        interfaces=tuple(name for name, interface in offered if interface is not None),
+        interfaces=tuple(name for name, interface in interfaces if interface is not None),
         start=read_number(experiment, "startTime"),
         stop=read_number(experiment, "stopTime"),
         tolerance=read_number(experiment, "tolerance"),

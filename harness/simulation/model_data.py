@@ -111,7 +111,7 @@ def parse_model_data(content: Mapping[str, Any]) -> ModelData:
         tuple(map(parse_table, content["tables"])),
         {str(force): str(mode) for force, mode in content["contacts"].items()},
         {str(name): tuple(map(str, inputs)) for name, inputs in content["rate_inputs"].items()},
-        {str(name): (str(one["label"]), int(one["value"])) for name, one in content["fixed_choices"].items()},
+        {str(name): (str(choice["label"]), int(choice["value"])) for name, choice in content["fixed_choices"].items()},
         {str(name): tuple(map(str, attributes)) for name, attributes in content["exclusive_bounds"].items()},
     )
 

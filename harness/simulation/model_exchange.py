@@ -136,10 +136,10 @@ class ModelExchange:
         self.fmu.setTime(t_end)
         if self.signals:
             self.signals.apply(t_end)
-        needs_event = terminated = False
+        needs_event = is_terminated = False
         if self.instance.interface.needsCompletedIntegratorStep:
-            needs_event, terminated = self.fmu.completedIntegratorStep()
-        if terminated:
+            needs_event, is_terminated = self.fmu.completedIntegratorStep()
+        if is_terminated:
             raise TerminatedError(t_end, "it returned terminateSimulation from a completed step")
         is_tick = self.clocks is not None and self.clocks.is_due(t_end)
         self.is_event = has_root or needs_event or is_tick or t_end >= min(self.next_event, jump)

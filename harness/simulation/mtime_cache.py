@@ -12,11 +12,11 @@ def cached_by_mtime(make: Callable[..., Result]) -> Callable[..., Result]:
     """Decorate make(fmu, ...) with a cache keyed by path, modification time and arguments. The file must exist."""
 
     @cache
-    def cached(fmu: Path, mtime: int, *arguments: Hashable) -> Result:
+    def cached_result(fmu: Path, mtime: int, *arguments: Hashable) -> Result:
         return make(fmu, *arguments)
 
     @wraps(make)
     def lookup(fmu: Path, *arguments: Hashable) -> Result:
-        return cached(fmu.absolute(), fmu.stat().st_mtime_ns, *arguments)
+        return cached_result(fmu.absolute(), fmu.stat().st_mtime_ns, *arguments)
 
     return lookup

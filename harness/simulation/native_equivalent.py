@@ -94,8 +94,12 @@ def is_same_model(fmu: Path, other: Path) -> bool:
     for path in (fmu, other):
         with open_simulator(RunSpec(path, outputs, times=times, follow=False)) as simulator:
             runs.append(simulator.prepare(simulator.spec)({}))
-    one, two = runs
-    return one is not None and two is not None and np.allclose(one, two, rtol=AGREEMENT, atol=AGREEMENT)
+    values, other_values = runs
+    return (
+        values is not None
+        and other_values is not None
+        and np.allclose(values, other_values, rtol=AGREEMENT, atol=AGREEMENT)
+    )
 
 
 def declared_variables(fmu: Path) -> set[tuple[Any, ...]]:

@@ -34,7 +34,7 @@ METHODS = {"exact": "dop853", "ode23": "dop853", "ode45": "dop853", "rodas": "ra
 DEFAULT_RTOL = 1e-12
 MAX_STEPS = 200_000  # internal steps of a motion
 MAX_ITERATIONS = 30  # of Newton's method
-SAMPLED = 3  # points of a motion at which derivatives are compared
+SAMPLE_POINTS = 3  # points of a motion at which derivatives are compared
 PERIODS = 256  # of inputs: more than a motion is followed
 STOP = 1e100  # s: no motion ends there
 
@@ -82,11 +82,11 @@ class SteadySliding(NamedTuple):
 
 @contextmanager
 def open_oscillator(
-    spec: RunSpec, varied: Sequence[str] = (), period: float | None = None, section: str = ""
+    spec: RunSpec, varied_names: Sequence[str] = (), period: float | None = None, section: str = ""
 ) -> "Iterator[Oscillator]":
     """Open an oscillator; its parameters are those of `Oscillator`."""
     with ExitStack() as resources:
-        yield Oscillator(spec, varied, period, section, resources)
+        yield Oscillator(spec, varied_names, period, section, resources)
 
 
 class Oscillator:
@@ -96,7 +96,7 @@ class Oscillator:
     ----------
     spec : RunSpec
         Native FMU with directional derivatives, and values.
-    varied : sequence of str
+    varied_names : sequence of str
         Parameters that `set_point` changes.
     period : float or None
         Period in s of forces that depend on a clock.
@@ -142,15 +142,15 @@ class Oscillator:
     """
 
     def __init__(
-        self, spec: RunSpec, varied: Sequence[str], period: float | None, section: str, resources: ExitStack
+        self, spec: RunSpec, varied_names: Sequence[str], period: float | None, section: str, resources: ExitStack
     ) -> None:
-        self.resources, self.varied, self.period, self.n_runs = resources, tuple(varied), period, 0
+        self.resources, self.varied_names, self.period, self.n_runs = resources, tuple(varied_names), period, 0
         description, self.folder = read_description(spec.fmu), unpack_once(spec.fmu)
         self.variables = {variable.name: variable for variable in description.modelVariables}
         self.parameters = [
             name for name, item in self.variables.items() if item.causality == "parameter" and item.type == "Real"
         ]
-        check_varied("parameter", varied, self.parameters, spec.values)
+        check_varied("parameter", varied_names, self.parameters, spec.values)
         self.states = tuple(state.name for state in state_variables(description))
         self.rates = tuple(unknown.variable.name for unknown in description.derivatives)
         self.speeds = np.isin(self.states, self.rates).astype(float)
@@ -170,19 +170,19 @@ class Oscillator:
         modes = tuple(read_model_data(spec.fmu).contacts.values())
         readable = [name for name, item in self.variables.items() if item.causality == "output" and item.type == "Real"]
         check_names("section", [section] * bool(section), [*dict.fromkeys((*modes, *self.states, *readable))])
-        self.crossed = "" if section in modes else section
-        self.released = slice(modes.index(section), modes.index(section) + 1) if section in modes else slice(None)
-        reals = [*dict.fromkeys((*self.states, *self.rates, *[section] * bool(self.crossed), "solver.t_next"))]
-        groups = self.states, self.rates, [section] * bool(self.crossed)
+        self.section_variable = "" if section in modes else section
+        self.section_modes = slice(modes.index(section), modes.index(section) + 1) if section in modes else slice(None)
+        reals = [*dict.fromkeys((*self.states, *self.rates, *[section] * bool(self.section_variable), "solver.t_next"))]
+        groups = self.states, self.rates, [section] * bool(self.section_variable)
         self.positions = [[reals.index(name) for name in group] for group in groups]
         self.n_modes, read = len(modes), [*modes, *["events.count"] * bool(modes), *reals]
         self.instance = resources.enter_context(open_instance(self.spec, self.folder))
-        self.session = Session(self.instance, self.spec, (*self.varied, *self.initial), read)
+        self.session = Session(self.instance, self.spec, (*self.varied_names, *self.initial), read)
         self.signals = input_signals(self.spec, self.instance)
         self.last_equilibrium: np.ndarray | None = None
-        self.set_point([self.default(name) for name in varied])
+        self.set_point([self.default(name) for name in varied_names])
         self.offsets = np.array([self.default(name) for name in self.initial])
-        self.turned = np.zeros((len(self.states), len(self.initial)))
+        self.phase_matrix = np.zeros((len(self.states), len(self.initial)))
         self.start = self.begin_with(self.offsets).y
         columns = [self.begin_with(self.offsets + step).y - self.start for step in np.eye(len(self.initial))]
         self.matrix = np.array(columns).reshape(-1, len(self.states)).T
@@ -203,7 +203,7 @@ class Oscillator:
 
     def begin_with(self, initial: np.ndarray) -> Point:
         """Start a motion with values of the parameters that set the states."""
-        self.shift = self.turned @ initial
+        self.shift = self.phase_matrix @ initial
         try:
             self.session.start((*self.point, *initial.tolist()))
             if self.signals:
@@ -227,7 +227,7 @@ class Oscillator:
         self.t_next = float(reals[-1])
         n_changes = int(values[self.n_modes]) if modes else 0
         y = reals[self.positions[0]] + self.shift
-        section = float(reals[self.positions[2]].sum()) if self.crossed else nan
+        section = float(reals[self.positions[2]].sum()) if self.section_variable else nan
         return Point(t, y, reals[self.positions[1]], tuple(map(int, modes)), n_changes, section)
 
     def step(self, t: float, end: float) -> Point:
@@ -271,19 +271,19 @@ class Oscillator:
 
     def is_return(self, last: Point, point: Point) -> bool:
         """Return whether a motion passes the section between two points of `follow`."""
-        if self.crossed:
+        if self.section_variable:
             return last.section < 0.0 == point.section
-        one, two = last.modes[self.released], point.modes[self.released]
-        return 0 in one and 0 not in two
+        last_modes, modes = last.modes[self.section_modes], point.modes[self.section_modes]
+        return 0 in last_modes and 0 not in modes
 
     def locate(self, last: Point, point: Point, value: Callable[[Point], float]) -> Point:
         """Return the point between two points at which a value is zero."""
-        found, h = [point], point.t - last.t
+        points, h = [point], point.t - last.t
 
         def value_after(time: float) -> float:
             self.begin(last.y)
-            found[0] = self.step(0.0, time)
-            return value(found[0])
+            points[0] = self.step(0.0, time)
+            return value(points[0])
 
         low, high = value(last), value(point)
         if high and low * high < 0.0:
@@ -291,14 +291,14 @@ class Oscillator:
                 lambda s: low if s == 0.0 else high if s == h else value_after(s), 0.0, h, xtol=1e-15, rtol=1e-15
             )
             value_after(max(float(root), 1e-12 * h))
-        return found[0]._replace(t=last.t + found[0].t)
+        return points[0]._replace(t=last.t + points[0].t)
 
     def differentiate(self, y: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (n,) after a time in s, and their derivatives (n, n) by the states y, or NaN."""
         initial = dict(zip(self.initial, self.initial_values(y).tolist(), strict=True))
         spec = replace(
             self.spec,
-            values=self.settings | dict(zip(self.varied, self.point, strict=True)) | initial,
+            values=self.settings | dict(zip(self.varied_names, self.point, strict=True)) | initial,
             outputs=self.states,
             times=np.array([period]),
             stop=period,
@@ -320,15 +320,17 @@ class Oscillator:
         unknowns, knowns = (
             [self.variables[name].valueReference for name in names] for names in (self.rates, self.states)
         )
-        return np.array([self.instance.fmu.getDirectionalDerivative(unknowns, [one], [1.0]) for one in knowns]).T
+        return np.array(
+            [self.instance.fmu.getDirectionalDerivative(unknowns, [reference], [1.0]) for reference in knowns]
+        ).T
 
     def sliding_states(self) -> Iterator[np.ndarray]:
         """Yield states near the start in which no contact sticks: there the speeds are changed by other rates."""
         rates = self.begin(self.start).f
         sizes = sorted({*np.abs(rates).tolist()} - {0.0}) or [1.0]
         different = np.cumsum(self.speeds) * self.speeds  # or bodies stay at rest against each other
-        moved = [self.start + sign * size * different for size in sizes for sign in (1, -1)]
-        yield from (y for y in (self.start, *moved) if not self.begin(y).sticks)
+        moved_states = [self.start + sign * size * different for size in sizes for sign in (1, -1)]
+        yield from (y for y in (self.start, *moved_states) if not self.begin(y).sticks)
 
     def find_coordinates(self) -> None:
         """Find the coordinates that repeat, and the values of the parameters that set them at the start."""
@@ -339,7 +341,9 @@ class Oscillator:
         if not states:
             raise HarnessError(f"{name} has a contact that sticks in all states near its start: choose another start")
         rates = self.begin(states[0]).f
-        points = (point for y in states for point in islice(self.follow(y), 0, SAMPLED * 10, 10) if not point.sticks)
+        points = (
+            point for y in states for point in islice(self.follow(y), 0, SAMPLE_POINTS * 10, 10) if not point.sticks
+        )
         jacobians = np.array([self.read_jacobian() for _ in points])
         is_constant = ~jacobians.any(axis=(0, 2))
         self.phase = self.find_phase(is_constant & (rates != 0.0) & jacobians.any(axis=(0, 1)))
@@ -347,10 +351,10 @@ class Oscillator:
             self.find_phase_parameter(self.phase, states[0])
         self.sets_phase = self.phase is not None and bool(self.matrix[self.phase].any())
         basis = self.find_basis(jacobians)
-        measured = np.flatnonzero(basis.any(axis=1) & ~is_constant)
-        if not len(measured):
+        candidates = np.flatnonzero(basis.any(axis=1) & ~is_constant)
+        if not len(candidates):
             raise HarnessError(f"{name} has no force that depends on a position or a speed, and so no oscillations")
-        self.coordinate = int(measured[0])
+        self.coordinate = int(candidates[0])
         row = basis[self.coordinate]
         self.gauge = basis @ row / (row @ row)
         self.displacement = self.gauge / (self.gauge @ self.gauge)
@@ -378,8 +382,8 @@ class Oscillator:
 
     def find_basis(self, jacobians: np.ndarray) -> np.ndarray:
         """Return the coordinates (n, r) of the states except the phase, without translations, which change no rate."""
-        unit, kept = np.eye(len(self.states)), np.arange(len(self.states)) != self.phase
-        positions, speeds = unit[:, kept & (self.speeds == 0.0)], unit[:, kept & (self.speeds > 0.0)]
+        unit, is_kept = np.eye(len(self.states)), np.arange(len(self.states)) != self.phase
+        positions, speeds = unit[:, is_kept & (self.speeds == 0.0)], unit[:, is_kept & (self.speeds > 0.0)]
         columns = np.concatenate(jacobians) @ positions
         scales = np.linalg.norm(columns, axis=0)
         scales[scales == 0.0] = 1.0
@@ -396,10 +400,12 @@ class Oscillator:
         """
         is_phase = (np.arange(len(self.states)) == self.phase) & self.sets_phase
         set_by = np.column_stack([basis, np.eye(len(self.states))[:, is_phase]])
-        reduced = set_by.T @ self.matrix
-        self.inverse = np.linalg.pinv(reduced) @ set_by.T
-        for state, missing in zip(self.states, set_by @ (reduced @ np.linalg.pinv(reduced)) - set_by, strict=True):
-            if np.abs(missing).max() > 1e-9:
+        reduced_matrix = set_by.T @ self.matrix
+        self.inverse = np.linalg.pinv(reduced_matrix) @ set_by.T
+        for state, remainder in zip(
+            self.states, set_by @ (reduced_matrix @ np.linalg.pinv(reduced_matrix)) - set_by, strict=True
+        ):
+            if np.abs(remainder).max() > 1e-9:
                 raise self.has_no_start(state)
 
     def has_no_start(self, state: str) -> HarnessError:
@@ -416,11 +422,11 @@ class Oscillator:
         """
         first = self.begin(y)
         later = self.step(0.0, 0.3 / abs(first.f[phase]))
-        reached = self.offsets + self.inverse @ (later.y - self.start)
+        offsets = self.offsets + self.inverse @ (later.y - self.start)
         for j in np.flatnonzero([self.units[name] == "rad" for name in self.initial]):
-            turned = reached + (later.y[phase] - first.y[phase]) * np.eye(len(self.initial))[j]
-            if np.allclose(self.begin_with(turned).f, later.f, rtol=1e-6, atol=0.0):
-                self.turned[phase, j] = self.matrix[phase, j] = 1.0
+            turned_offsets = offsets + (later.y[phase] - first.y[phase]) * np.eye(len(self.initial))[j]
+            if np.allclose(self.begin_with(turned_offsets).f, later.f, rtol=1e-6, atol=0.0):
+                self.phase_matrix[phase, j] = self.matrix[phase, j] = 1.0
                 self.start = self.begin_with(self.offsets).y
                 return
 

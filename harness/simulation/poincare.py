@@ -25,9 +25,9 @@ from .motion import NEUTRAL, SLIDING_ORBIT, STICK_SLIP, Motion
 from .oscillator import MAX_ITERATIONS, Oscillator, Point, SteadySliding
 
 REPEATS = 1e-9  # relative difference of states that repeat
-SETTLED = 1e-3  # of the first distance to steady sliding
-COLLAPSED = 1e-4  # share of the first rates at which an orbit has shrunk to steady sliding
-CLOSED = 1e-8  # the same of the ends of an orbit
+SETTLED_DISTANCE = 1e-3  # of the first distance to steady sliding
+COLLAPSED_RATE = 1e-4  # share of the first rates at which an orbit has shrunk to steady sliding
+CLOSURE_ERROR = 1e-8  # the same of the ends of an orbit
 MAX_TURNS = 64  # without sticking
 RETURNS = (16, 48, 192)  # until a motion has repeated; after each, Newton's method is tried
 MAX_MULTIPLE = 8  # slips, or periods of the force, of the longest period
@@ -37,7 +37,7 @@ MAX_DOUBLINGS = 60  # of a change of speed
 BESIDE = 1e-6  # relative difference of the speed of a body that sticks at once
 JUMP = 1e-5  # growth of an amplitude at its zero that is a jump
 ROOT_RTOL = 1e-13  # relative accuracy of zeros
-SCANNED = 16  # amplitudes between which orbits that do not stick are sought
+SCAN_POINTS = 16  # amplitudes between which orbits that do not stick are sought
 REST, TURNING, CYCLE, IRREGULAR = "rest", "sliding", "cycle", "irregular"
 
 
@@ -146,9 +146,9 @@ class ReturnMap:
         point = path[0] if self.oscillator.is_forced and not self.oscillator.sets_phase else middle
         return Ending(CYCLE, point.y, path[-1].t - path[0].t, n_sticks)
 
-    def distance(self, one: np.ndarray, two: np.ndarray) -> float:
+    def distance(self, y: np.ndarray, other: np.ndarray) -> float:
         """Return the largest difference of the coordinates of two states."""
-        return float(np.abs(self.oscillator.reduce(two - one)).max())
+        return float(np.abs(self.oscillator.reduce(other - y)).max())
 
     def is_maximum(self, last: Point, point: Point) -> bool:
         """Return whether the state that measures the motion has a maximum between two points."""
@@ -156,7 +156,7 @@ class ReturnMap:
 
     def approaches(self, steady: SteadySliding | None, y: np.ndarray, end: Ending) -> bool:
         """Return whether the motion from states y to an end has nearly settled to steady sliding."""
-        return steady is not None and self.distance(end.y, steady.y) <= SETTLED * self.distance(y, steady.y)
+        return steady is not None and self.distance(end.y, steady.y) <= SETTLED_DISTANCE * self.distance(y, steady.y)
 
     # ---- orbits
 
@@ -198,7 +198,7 @@ class ReturnMap:
             matrix = monodromy - np.eye(len(monodromy))
             if is_free:
                 flow = oscillator.reduce(oscillator.begin(y).f)
-                if np.abs(flow).max() < COLLAPSED * speed:
+                if np.abs(flow).max() < COLLAPSED_RATE * speed:
                     raise NoOrbitError("Newton's method ends in steady sliding")
                 ahead = oscillator.reduce(oscillator.begin(end).f)
                 matrix = np.block([[matrix, ahead[:, None] / rate], [flow / rate, np.zeros(1)]])
@@ -206,11 +206,11 @@ class ReturnMap:
             if not np.isfinite(matrix).all():
                 break
             change = np.linalg.lstsq(matrix, -residual, rcond=1e-12)[0]
-            moved, delay = basis @ change[: len(monodromy)], float(change[-1]) / rate if is_free else 0.0
+            correction, delay = basis @ change[: len(monodromy)], float(change[-1]) / rate if is_free else 0.0
             largest = np.abs(change[: len(monodromy)]).max()
             if size <= 1e-3 * REPEATS * scale and largest <= REPEATS * scale and abs(delay) <= REPEATS * period:
                 break
-            y, period = y + moved, period + delay
+            y, period = y + correction, period + delay
             if not (largest <= scale and 0.1 * guess < period < 10.0 * guess):
                 raise NoOrbitError("Newton's method does not converge")
         return self.measure_orbit(y, period, self.select_multipliers(monodromy))
@@ -237,7 +237,7 @@ class ReturnMap:
         extremes = [oscillator.measure(point.y) for point in path]
         scale = max(float(np.abs(oscillator.reduce(point.y)).max()) for point in path) or 1.0
         error = self.distance(y, path[-1].y) / scale
-        if not error <= CLOSED:
+        if not error <= CLOSURE_ERROR:
             raise NoOrbitError(f"Newton's method does not converge: the states change by {error:.1e} in a period")
         stick_time, n_sticks = 0.0, 0
         for last, point in pairwise(path):
@@ -310,13 +310,15 @@ class ReturnMap:
         y = self.start_sticking(steady)
         if y is None:
             return None
-        last, released = self.oscillator.begin(y), inf
+        last, release_time = self.oscillator.begin(y), inf
         for point in self.oscillator.follow(y):
             if last.sticks and not point.sticks:
-                released = point.t
-            if point.t > released and self.is_maximum(last, point):
+                release_time = point.t
+            if point.t > release_time and self.is_maximum(last, point):
                 return last, point
-            if not point.sticks and point.t > MAX_TURNS * steady.turn_time + (0.0 if released == inf else released):
+            if not point.sticks and point.t > MAX_TURNS * steady.turn_time + (
+                0.0 if release_time == inf else release_time
+            ):
                 return None
             last = point
         return None
@@ -359,8 +361,8 @@ class ReturnMap:
             if point.n_changes:
                 break
             if last.t and self.is_maximum(last, point):
-                found = self.locate_turn(last, point)
-                return self.oscillator.measure(found.y - steady.y), found.t
+                turning_point = self.locate_turn(last, point)
+                return self.oscillator.measure(turning_point.y - steady.y), turning_point.t
             last = point
         return nan, nan
 
@@ -382,14 +384,14 @@ class ReturnMap:
             after = self.turn(steady, amplitude)[0]
             return (largest if after != after else after) / amplitude - 1.0
 
-        scanned = [0.0, *(largest * np.append(np.geomspace(1e-2, 1.0, SCANNED)[:-1], 1.0 - GRAZING)).tolist()]
-        gains = {amplitude: gain(amplitude) for amplitude in scanned}
-        for a, b, c in zip(scanned, scanned[1:], scanned[2:], strict=False):
+        amplitudes = [0.0, *(largest * np.append(np.geomspace(1e-2, 1.0, SCAN_POINTS)[:-1], 1.0 - GRAZING)).tolist()]
+        gains = {amplitude: gain(amplitude) for amplitude in amplitudes}
+        for a, b, c in zip(amplitudes, amplitudes[1:], amplitudes[2:], strict=False):
             sign = float(np.sign(gains[b]))
             if 0.0 < sign * gains[b] < min(sign * gains[a], sign * gains[c]):
                 options = {"xatol": 1e-6 * largest}
-                found = minimize_scalar(lambda x, sign=sign: sign * gain(x), (a, c), bounds=(a, c), options=options)
-                gains[float(found.x)] = gain(float(found.x))
+                minimum = minimize_scalar(lambda x, sign=sign: sign * gain(x), (a, c), bounds=(a, c), options=options)
+                gains[float(minimum.x)] = gain(float(minimum.x))
         neutral = [amplitude for amplitude, growth in gains.items() if amplitude and abs(growth) <= NEUTRAL]
         if len(neutral) > 1:
             largest_neutral = f"orbits of all amplitudes up to at least {max(neutral):.4g}"

@@ -83,10 +83,10 @@ def array_shape(variable: Any, values: Mapping[str, Any]) -> tuple[int, ...]:
 def select_variables(spec: RunSpec, variables: Mapping[str, Any], values: Mapping[str, Any]) -> list[ShapedVariable]:
     """Return the variables to record with their shapes; an element selects its whole array."""
     shapes = {name: array_shape(variable, values) for name, variable in variables.items() if variable.type in C_TYPES}
-    named = {name if name in shapes else name.rpartition("[")[0] for name in spec.outputs} & {*shapes}
-    if (count := sum(prod(shapes[name]) for name in named)) > MAX_COLUMNS:
+    selected_names = {name if name in shapes else name.rpartition("[")[0] for name in spec.outputs} & {*shapes}
+    if (count := sum(prod(shapes[name]) for name in selected_names)) > MAX_COLUMNS:
         raise SceneError(f"{spec.fmu.name}: the outputs have {count} elements; record at most {MAX_COLUMNS}")
-    owner = {element: name for name in named for element in (name, *element_names(name, shapes[name]))}
+    owner = {element: name for name in selected_names for element in (name, *element_names(name, shapes[name]))}
     check_names("output", [name for name in spec.outputs if name not in owner], shapes)
     names = dict.fromkeys(owner[name] for name in spec.outputs)
     return [(variables[name], shapes[name]) for name in names]
@@ -188,7 +188,7 @@ class Recorder:
         self.buffers: list[Any] = []  # of each type
         self.cells: dict[str, tuple[Any, int]] = {}  # of Reals: buffer and index
         self.texts: list[tuple[Any, Any]] = []  # of Strings: pointers and indices
-        self.clocked: list[ClockedCall] = []
+        self.clocked_calls: list[ClockedCall] = []
         for type_name, variables, names in group_by_type(selection):
             kind, offset = layout.fields[type_name][0].base, layout.fields[type_name][1]  # type: ignore[index]
             item = np.ctypeslib.as_ctypes_type(kind)
@@ -216,14 +216,14 @@ class Recorder:
         texts = [(values, buffer)] if is_text else []
         if self.instance.ticks_clocks and variables[0].clocks:
             clocks = {clock.valueReference for clock in variables[0].clocks}
-            self.clocked.append(ClockedCall(clocks, call, texts))
+            self.clocked_calls.append(ClockedCall(clocks, call, texts))
         else:
             self.calls.append(call)
             self.texts += texts
 
     def read_clocked(self, active: set[int]) -> None:
         """Read the variables that belong to an active clock, given by value references; rows repeat their values."""
-        for reading in self.clocked:
+        for reading in self.clocked_calls:
             if reading.clocks & active:
                 self.read([reading.call], reading.texts)
 

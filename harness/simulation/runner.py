@@ -54,10 +54,10 @@ def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
 
 def keep_times(run: Trajectory, times: np.ndarray) -> Trajectory:
     """Keep the points of a run nearest to times in s, after an event there; the last one if it ends before them all."""
-    reached = times[times <= run.time[-1] + POINT_TOLERANCE * (run.time[-1] - run.time[0])]
-    before = np.searchsorted(run.time, reached, "right") - 1
+    reached_times = times[times <= run.time[-1] + POINT_TOLERANCE * (run.time[-1] - run.time[0])]
+    before = np.searchsorted(run.time, reached_times, "right") - 1
     after = np.minimum(before + 1, len(run.time) - 1)
-    rows = np.where(run.time[after] - reached < reached - run.time[before], after, before)
+    rows = np.where(run.time[after] - reached_times < reached_times - run.time[before], after, before)
     return keep_rows(run, rows if len(rows) else np.array([len(run.time) - 1]))
 
 
@@ -104,25 +104,25 @@ def runs_in_process(spec: RunSpec) -> bool:
 
 @contextmanager
 def open_session(
-    spec: RunSpec, varied: Sequence[str] = (), read: Sequence[str] = ()
+    spec: RunSpec, varied_names: Sequence[str] = (), read: Sequence[str] = ()
 ) -> "Iterator[Session | ChildSession]":
     """Open the session of a run: in this process, or in a worker if the FMU is external.
 
     Parameters
     ----------
     spec : RunSpec
-    varied : sequence of str
+    varied_names : sequence of str
         Variables whose values differ from run to run.
     read : sequence of str
         Variables that are read at the end of runs in this process.
     """
     if runs_in_process(spec):
         with open_instance(spec) as instance:
-            yield Session(instance, spec, varied, read)
+            yield Session(instance, spec, varied_names, read)
     else:
         from .external.simulation import ChildSession
 
-        with ChildSession(spec, read_description(spec.fmu, spec.lenient), varied) as session:
+        with ChildSession(spec, read_description(spec.fmu, spec.lenient), varied_names) as session:
             yield session
 
 
@@ -147,13 +147,13 @@ def read_own_description(fmu: Path, exchange: bool = False) -> Any:
 
 
 @contextmanager
-def open_instance(spec: RunSpec, unpacked: Path | None = None) -> Iterator[FmuInstance]:
+def open_instance(spec: RunSpec, unpacked_folder: Path | None = None) -> Iterator[FmuInstance]:
     """Instantiate an FMU, unpacked in a temporary directory or before; capture its messages."""
     description = read_own_description(spec.fmu, spec.exchange)
     readable = [item.name for item in description.modelVariables if item.causality in ("output", "local")]
     check_names("output", spec.outputs, readable)
     with ExitStack() as stack:
-        folder = unpacked or stack.enter_context(unpack(spec.fmu))
+        folder = unpacked_folder or stack.enter_context(unpack(spec.fmu))
         log = LogCapture(stack.enter_context(capture_stderr()))
         try:
             instance = FmuInstance(description, folder, spec.exchange, spec.model, log)

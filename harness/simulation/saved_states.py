@@ -33,7 +33,7 @@ class SavedStateMotion:
     ----------
     spec : RunSpec
         FMU and values; a motion without a return during its run time returns no more.
-    varied : sequence of str
+    varied_names : sequence of str
         Parameters that `count_returns` sets.
     section : str
         Output that rises through zero at a return.
@@ -48,7 +48,7 @@ class SavedStateMotion:
         If the FMU cannot save its states.
     """
 
-    def __init__(self, spec: RunSpec, varied: Sequence[str], section: str, resources: ExitStack) -> None:
+    def __init__(self, spec: RunSpec, varied_names: Sequence[str], section: str, resources: ExitStack) -> None:
         description, folder = read_description(spec.fmu, spec.lenient), unpack_once(spec.fmu)
         names = "canGetAndSetFMUstate", "canGetAndSetFMUState"
         if not has_capability(folder, *names, interface_name="CoSimulation"):
@@ -57,7 +57,7 @@ class SavedStateMotion:
         settable = [
             name for name, item in variables.items() if item.causality == "parameter" and item.type in REAL_TYPES
         ]
-        check_varied("parameter", varied, settable, spec.values)
+        check_varied("parameter", varied_names, settable, spec.values)
         self.outputs = [
             name
             for name, item in variables.items()
@@ -71,7 +71,7 @@ class SavedStateMotion:
             )
         check_names("section", [section], self.outputs)
         self.spec, self.column, self.n_runs = spec, self.outputs.index(section), 0
-        self.varied = [variables[name] for name in varied]
+        self.varied_variables = [variables[name] for name in varied_names]
         self.settings = resolve_settings(spec, variables)
         self.start, self.stop = resolve_time_span(spec, description)
         experiment = description.defaultExperiment
@@ -94,50 +94,50 @@ class SavedStateMotion:
 
     def follow(self, point: Sequence[float]) -> float:
         """Do what `count_returns` does; failures of the FMU are raised as they are."""
-        fmu, t, returned, self.n_runs = self.instance.fmu, self.start, self.start, self.n_runs + 1
+        fmu, t, return_time, self.n_runs = self.instance.fmu, self.start, self.start, self.n_runs + 1
         self.instance.restart()
-        self.instance.initialize([*self.settings, *zip(self.varied, point, strict=True)], t, None)
+        self.instance.initialize([*self.settings, *zip(self.varied_variables, point, strict=True)], t, None)
         returns: deque[list[np.ndarray]] = deque(maxlen=MAX_MULTIPLE)  # outputs there, and their bounds since then
         last = low = high = self.read()
         n_returns = 0
-        while t < returned + self.stop - self.start:
+        while t < return_time + self.stop - self.start:
             check_interrupt()
-            saved = fmu.getFMUState()
+            saved_state = fmu.getFMUState()
             self.instance.step(t, self.h)
             new = self.read()
             low, high = np.minimum(low, new), np.maximum(high, new)
             passes = last[self.column] < 0.0 <= new[self.column]
-            found = self.locate(t, saved, last, new) if passes else new
-            fmu.freeFMUState(saved)
+            outputs = self.locate(t, saved_state, last, new) if passes else new
+            fmu.freeFMUState(saved_state)
             for item in returns:
                 item[1:] = np.minimum(item[1], new), np.maximum(item[2], new)
             if passes:
                 for number, (old, least, most) in enumerate(reversed(returns), 1):
                     if (most - least)[self.column] <= REPEATS * (high - low)[self.column]:
                         return 0  # it has come to rest
-                    if (np.abs(found - old) <= REPEATS * (most - least)).all():
+                    if (np.abs(outputs - old) <= REPEATS * (most - least)).all():
                         return number
-                n_returns, returned = n_returns + 1, t
+                n_returns, return_time = n_returns + 1, t
                 if n_returns == MAX_RETURNS:
                     return nan
-                returns.append([found, found, found])
+                returns.append([outputs, outputs, outputs])
             last, t = new, t + self.h
         return 0
 
-    def locate(self, t: float, saved: object, last: np.ndarray, new: np.ndarray) -> np.ndarray:
+    def locate(self, t: float, saved_state: object, last: np.ndarray, new: np.ndarray) -> np.ndarray:
         """Return the outputs at the return in a step from a time in s, and go to the end of this step again."""
-        found = [new]
+        outputs = [new]
 
         def value_after(h: float) -> float:
             if h in (0.0, self.h):
                 return float((new if h else last)[self.column])
-            self.instance.fmu.setFMUState(saved)
+            self.instance.fmu.setFMUState(saved_state)
             self.instance.step(t, h)
-            found[0] = self.read()
-            return float(found[0][self.column])
+            outputs[0] = self.read()
+            return float(outputs[0][self.column])
 
         if new[self.column]:
             value_after(float(brentq(value_after, 0.0, self.h, xtol=1e-15, rtol=1e-15)))
-        self.instance.fmu.setFMUState(saved)
+        self.instance.fmu.setFMUState(saved_state)
         self.instance.step(t, self.h)
-        return found[0]
+        return outputs[0]

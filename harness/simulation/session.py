@@ -45,7 +45,7 @@ REPORT_INTERVAL = 4096  # communication points at most, from one report of the p
 MIN_REPORTS = 50  # of the progress in a run on a grid: a report also checks the time limit
 LEAST_PROGRESS = 1 / 4096  # of a run in its time limit: one of the communication steps that a run has by default
 MAX_CVODE_STEPS = 500  # of model exchange, from point to point: the limit of fmpy's simulate_fmu
-FOLLOWED = ("solver.t_next", "solver.rejected", "events.count", "events.t_last")  # record internal steps and events
+STEP_NAMES = ("solver.t_next", "solver.rejected", "events.count", "events.t_last")  # record internal steps and events
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Session:
         Instance of the FMU, which is reset before each run but its first.
     spec : RunSpec
         The run. With `exchange`, `tolerance` is that of the solver.
-    varied : sequence of str
+    varied_names : sequence of str
         Variables whose values differ from run to run.
     read : sequence of str
         Variables that `read` returns.
@@ -119,7 +119,7 @@ class Session:
     """
 
     def __init__(
-        self, instance: FmuInstance, spec: RunSpec, varied: Sequence[str] = (), read: Sequence[str] = ()
+        self, instance: FmuInstance, spec: RunSpec, varied_names: Sequence[str] = (), read: Sequence[str] = ()
     ) -> None:
         self.instance, self.variables = instance, instance.variables
         self.grid = plan_grid(spec, instance)
@@ -130,19 +130,19 @@ class Session:
         effective = {variable.name: effective_value(variable, value) for variable, value in settings}
         # in model exchange, the solver of the FMU takes no steps
         self.spec = replace(spec, values=effective, follow=spec.follow and not spec.exchange)
-        self.prepare_start(values, varied)
+        self.prepare_start(values, varied_names)
         if not spec.exchange:
             self.step_call = instance.prepare_call(
                 "DoStep", self.grid.start, self.grid.duration, 1, *instance.step_arguments
             )
         self.end = Recorder(instance, self.select([*dict.fromkeys(read)]), lambda row: None)
 
-    def prepare_start(self, values: dict[str, Any], varied: Sequence[str]) -> None:
+    def prepare_start(self, values: dict[str, Any], varied_names: Sequence[str]) -> None:
         """Prepare the calls that set values and initialize the instance."""
         call, start, stop = self.instance.prepare_call, self.grid.start, self.grid.stop
         is_fmi2, slots = self.instance.is_fmi2, {}
         groups: dict[str, list[str]] = {}
-        for name in dict.fromkeys([*values, *varied]):
+        for name in dict.fromkeys([*values, *varied_names]):
             groups.setdefault(self.instance.type_name(self.variables[name]), []).append(name)
         experiment = (0, 0.0, start, 1, stop)  # no tolerance
         calls = [call("SetupExperiment", *experiment)] if is_fmi2 else []
@@ -159,7 +159,7 @@ class Session:
             calls.append(call(f"Set{type_name}", references, len(variables), buffer, *counts))
         calls.append(call("EnterInitializationMode", *(() if is_fmi2 else experiment)))
         self.start_calls = [*calls, call("ExitInitializationMode")]
-        self.slots = [slots[name] for name in varied]
+        self.slots = [slots[name] for name in varied_names]
 
     def select(self, names: Sequence[str]) -> list[ShapedVariable]:
         """Return variables by name, to record them."""
@@ -170,7 +170,7 @@ class Session:
         """Return the variables to record: the outputs, and those that expose internal steps and events."""
         names = list(self.spec.outputs)
         if self.spec.follow:
-            extra = (*FOLLOWED, *read_model_data(self.spec.fmu).contacts.values())
+            extra = (*STEP_NAMES, *read_model_data(self.spec.fmu).contacts.values())
             names += [name for name in extra if name in self.variables and name not in names]
         return self.select(names)
 
@@ -233,16 +233,16 @@ class Session:
         try:
             for _ in range(repeat):
                 self.start(point)
-                started = perf_counter()
-                recorded = self.record(lambda share: report((len(seconds) + share) / repeat))
-                seconds.append(perf_counter() - started)
-            return self.build_trajectory(recorded, min(seconds))
+                start_time = perf_counter()
+                recorded_run = self.record(lambda share: report((len(seconds) + share) / repeat))
+                seconds.append(perf_counter() - start_time)
+            return self.build_trajectory(recorded_run, min(seconds))
         except CALL_FAILURES as error:
             raise HarnessError(self.instance.log.error_message or f"{self.spec.fmu.name}: {error}") from None
 
-    def build_trajectory(self, recorded: RecordedRun, seconds: float) -> Trajectory:
+    def build_trajectory(self, recorded_run: RecordedRun, seconds: float) -> Trajectory:
         """Build the trajectory of a run that has ended; `seconds` is its run time in s."""
-        spec, variables, time, samples = self.spec, self.variables, recorded.time, recorded.columns
+        spec, variables, time, samples = self.spec, self.variables, recorded_run.time, recorded_run.columns
         columns = {name: samples[name] for name in spec.outputs}
         for name, column in columns.items():
             invalid = np.flatnonzero(~np.isfinite(column))
@@ -269,16 +269,16 @@ class Session:
             parameters=effective,
             steps=steps,
             note=self.note,
-            statistics=replace(read_statistics(self.instance, seconds), evaluations=recorded.evaluations),
+            statistics=replace(read_statistics(self.instance, seconds), evaluations=recorded_run.evaluations),
         )
 
     def read_parameters(self) -> dict[str, float | str]:
         """Return the value of every parameter: reals in SI units, enumerations by label, also those that are fixed."""
-        fixed: dict[str, float | str] = {
+        fixed_labels: dict[str, float | str] = {
             name: label for name, (label, _) in read_model_data(self.spec.fmu).fixed_choices.items()
         }
         get = self.instance.get
-        return fixed | {
+        return fixed_labels | {
             name: enumeration_labels(variable)[get(name)] if variable.type == "Enumeration" else get(name)
             for name, variable in self.variables.items()
             if variable.causality == "parameter"
@@ -301,12 +301,12 @@ def plan_grid(spec: RunSpec, instance: FmuInstance) -> TimeGrid:
 def resolve_settings(run: RunSpec, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
     """Return variables and values to set before the run, checked against their declared ranges."""
     settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
-    fixed = read_model_data(run.fmu).fixed_choices
-    for name in run.values.keys() & fixed.keys():
-        if run.values[name] not in fixed[name]:
+    fixed_choices = read_model_data(run.fmu).fixed_choices
+    for name in run.values.keys() & fixed_choices.keys():
+        if run.values[name] not in fixed_choices[name]:
             setting = f"{name} = {format_value(run.values[name])}"
-            raise SceneError(f"{setting}: {run.fmu.name} was built with {fixed[name][0]} only; remove it")
-    values = {name: value for name, value in run.values.items() if name not in fixed}
+            raise SceneError(f"{setting}: {run.fmu.name} was built with {fixed_choices[name][0]} only; remove it")
+    values = {name: value for name, value in run.values.items() if name not in fixed_choices}
     for key, name in SHORT_KEYS.items():
         if name in values and name not in variables:
             setting = f"{key} = {format_value(values[name])}"
@@ -335,9 +335,11 @@ def find_step_ends(time: np.ndarray, next_step: np.ndarray, tolerance: float) ->
 
 def read_statistics(instance: FmuInstance, seconds: float) -> Statistics:
     """Return the counts of a run that has ended; `seconds` is its run time in s."""
-    steps, rejected, evaluations = (instance.get(f"solver.{name}") for name in ("steps", "rejected", "evaluations"))
+    steps, rejected_steps, evaluations = (
+        instance.get(f"solver.{name}") for name in ("steps", "rejected", "evaluations")
+    )
     if "events.count" not in instance.variables:
-        return Statistics(steps, rejected, evaluations, seconds)
+        return Statistics(steps, rejected_steps, evaluations, seconds)
     return Statistics(
-        steps, rejected, evaluations, seconds, instance.get("events.count"), instance.get("events.t_last")
+        steps, rejected_steps, evaluations, seconds, instance.get("events.count"), instance.get("events.t_last")
     )

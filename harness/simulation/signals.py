@@ -241,9 +241,9 @@ class Signals:
         if ax is not None:
             if len(names) > 1:
                 raise HarnessError(f"ax has room for one output, and {len(names)} are named: name one")
-            if not (chosen := names or choose_plotted(self)):
+            if not (plotted_names := names or choose_plotted(self)):
                 raise HarnessError(f"{self.name} has no output with a curve")
-            plot_output(ax, self, chosen[0], x)
+            plot_output(ax, self, plotted_names[0], x)
             return np.array([ax])
         figure = plt.figure()
         return draw_panels(figure, self, names or choose_plotted(self), [] if names or x else list_inputs(self), x)

@@ -48,8 +48,8 @@ def initialize(instance: FmuInstance, spec: RunSpec) -> None:
 
 def settings(instance: FmuInstance, values: dict[str, float]) -> list[tuple[Any, float]]:
     """Return pairs of variable and value, from values by name; a choice that the build fixed is no variable."""
-    given = [(instance.variables[name], value) for name, value in values.items() if name in instance.variables]
-    return [(variable, value if variable.type in REAL_TYPES else int(value)) for variable, value in given]
+    pairs = [(instance.variables[name], value) for name, value in values.items() if name in instance.variables]
+    return [(variable, value if variable.type in REAL_TYPES else int(value)) for variable, value in pairs]
 
 
 def set_values(instance: FmuInstance, values: dict[str, float]) -> None:
@@ -95,10 +95,10 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
     """
     with open_instance(spec, unpack_once(spec.fmu)) as instance:
         outputs, rows = find_outputs(instance), io.BytesIO()
-        recorded = [instance.variables[name] for name in outputs]
-        selection: list[ShapedVariable] = [(variable, ()) for variable in recorded]
+        variables = [instance.variables[name] for name in outputs]
+        selection: list[ShapedVariable] = [(variable, ()) for variable in variables]
         recorder = Recorder(instance, selection, rows.write)
-        started = perf_counter()
+        start_time = perf_counter()
         try:
             initialize(instance, spec)
             recorder.record(spec.start or 0.0)
@@ -108,11 +108,11 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
                 recorder.record(t + h)
         except CALL_FAILURES:
             return read_refusal(instance)
-        seconds = perf_counter() - started
+        seconds = perf_counter() - start_time
         return Trajectory(
             *read_rows(rows.getbuffer(), selection, instance.is_fmi2),
-            {variable.name: variable_unit(variable) for variable in recorded},
-            {variable.name: variable.description or variable.name for variable in recorded},
+            {variable.name: variable_unit(variable) for variable in variables},
+            {variable.name: variable.description or variable.name for variable in variables},
             spec=replace(spec, outputs=outputs),
             statistics=read_statistics(instance, seconds),
         )

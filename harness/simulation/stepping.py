@@ -261,11 +261,11 @@ def check_rates(fmu: Path, inputs: Inputs, values: Mapping[str, Any]) -> None:
     """
     time = np.asarray(inputs.get(TIME, ()), dtype=float)
     for name, rate_inputs in read_model_data(fmu).rate_inputs.items() if inputs else ():
-        missing = [rate for rate in rate_inputs if rate not in inputs and rate not in values]
-        if name in inputs and missing and (np.diff(inputs[name])[np.diff(time) > 0] != 0).any():
+        missing_rates = [rate for rate in rate_inputs if rate not in inputs and rate not in values]
+        if name in inputs and missing_rates and (np.diff(inputs[name])[np.diff(time) > 0] != 0).any():
             raise SceneError(
-                f"inputs: {name} varies, but {missing[0]} is missing, the rate by which the FMU continues it: add a "
-                f"column for {missing[0]}, or let {name} jump at times that occur twice"
+                f"inputs: {name} varies, but {missing_rates[0]} is missing, the rate by which the FMU continues it: "
+                f"add a column for {missing_rates[0]}, or let {name} jump at times that occur twice"
             )
 
 
@@ -308,13 +308,13 @@ def split_kinks(inputs: Inputs, rate_inputs: Mapping[str, Sequence[str]]) -> tup
         )
     if not notes:
         return {}, ""
-    split = {TIME: np.repeat(time, 2)[1:-1]} | {
+    split_inputs = {TIME: np.repeat(time, 2)[1:-1]} | {
         name: np.column_stack([begin[name], end[name]]).ravel() for name in columns
     }
-    return split, "; ".join(notes)
+    return split_inputs, "; ".join(notes)
 
 
-def values_of_steps(inputs: Inputs, points: np.ndarray, continued: Collection[str] = ()) -> np.ndarray:
+def values_of_steps(inputs: Inputs, points: np.ndarray, continued_inputs: Collection[str] = ()) -> np.ndarray:
     """Return the inputs (n, inputs) of a run: those at the start, and one row for each step.
 
     Parameters
@@ -323,12 +323,12 @@ def values_of_steps(inputs: Inputs, points: np.ndarray, continued: Collection[st
         The table, as `check_inputs` describes it.
     points : numpy.ndarray
         Communication points (n,) in s; all times of the table in between are among them.
-    continued : collection of str
+    continued_inputs : collection of str
         Inputs that the FMU continues by their rate from the value at the start of a step; others have the mean of both
         ends.
     """
     begin, end = ends_of_steps(inputs, points)
-    is_continued = np.array([name in continued for name in inputs if name != TIME], dtype=bool)
+    is_continued = np.array([name in continued_inputs for name in inputs if name != TIME], dtype=bool)
     return np.concatenate([begin[:1], np.where(is_continued, begin, 0.5 * (begin + end))])
 
 
@@ -359,8 +359,8 @@ def interpolate(time: np.ndarray, column: np.ndarray, points: np.ndarray, side: 
     before, after = np.maximum(after - 1, 0), np.minimum(after, len(time) - 1)
     interval = time[after] - time[before]  # 0 before and after the table
     share = np.divide(points - time[before], interval, out=np.zeros(len(points)), where=interval > 0)
-    interpolated: np.ndarray = (1.0 - share) * column[before] + share * column[after]
-    return interpolated
+    values: np.ndarray = (1.0 - share) * column[before] + share * column[after]
+    return values
 
 
 def input_signals(spec: RunSpec, instance: FmuInstance) -> "InputSignals | None":
@@ -383,7 +383,7 @@ class InputSignals:
         The table, as `check_inputs` describes it.
     instance : FmuInstance
         The instance.
-    continued : collection of str
+    continued_inputs : collection of str
         Inputs with a declared rate.
 
     Raises
@@ -392,7 +392,7 @@ class InputSignals:
         If the inputs are of several types.
     """
 
-    def __init__(self, inputs: Inputs, instance: FmuInstance, continued: Collection[str] = ()) -> None:
+    def __init__(self, inputs: Inputs, instance: FmuInstance, continued_inputs: Collection[str] = ()) -> None:
         variables = [instance.variables[name] for name in inputs if name != TIME]
         kinds = {variable.type for variable in variables}
         if len(kinds) > 1:
@@ -401,7 +401,7 @@ class InputSignals:
         self.references = [variable.valueReference for variable in variables]
         self.time = np.asarray(inputs[TIME], dtype=float)
         self.columns = [np.asarray(column, dtype=float) for name, column in inputs.items() if name != TIME]
-        self.is_continued = [name in continued for name in inputs if name != TIME]
+        self.is_continued = [name in continued_inputs for name in inputs if name != TIME]
         cosimulation = instance.description.coSimulation
         has_ranges = any(variable.min is not None or variable.max is not None for variable in variables)
         self.interpolates = (

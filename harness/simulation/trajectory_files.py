@@ -157,18 +157,18 @@ def read_modelica(file: Path) -> Columns | None:
         contents: dict[str, Any] = loadmat(io.BytesIO(data), chars_as_strings=False)
         if "Aclass" not in contents:
             return None
-        transposed = {"binTrans": True, "binNormal": False}[characters_to_text(contents["Aclass"][3])]
+        is_transposed = {"binTrans": True, "binNormal": False}[characters_to_text(contents["Aclass"][3])]
         name, description, info, values = (
-            contents[key].T if transposed else contents[key] for key in ("name", "description", "dataInfo", "data_2")
+            contents[key].T if is_transposed else contents[key] for key in ("name", "description", "dataInfo", "data_2")
         )
         columns = Columns()
-        for text, comment, (matrix, signed, *_) in zip(
+        for text, comment, (matrix, signed_index, *_) in zip(
             map(characters_to_text, name), map(characters_to_text, description), info, strict=True
         ):
             if matrix in (0, 2):  # trajectories and time
                 unit = re.search(r"\[([^][|:]+)[^][]*\]\s*$", comment)
                 heading = f"{text} [{unit[1]}]" if unit else text
-                column = np.sign(signed) * values[:, abs(int(signed)) - 1]
+                column = np.sign(signed_index) * values[:, abs(int(signed_index)) - 1]
                 is_integer = INTEGER_TYPE.search(comment) and (column == np.rint(column)).all()
                 columns[heading] = column.astype(np.int64) if is_integer else column
         return columns
@@ -196,8 +196,8 @@ def read_run(folder: Path) -> Trajectory:
         spec = RunSpec(Path(next(fmus, f"{folder.name}.fmu")), outputs=tuple(signals.columns))
     steps = None
     if (folder / "steps.csv").is_file():
-        ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
-        steps = SolverSteps(np.append(signals.time[0], ends), sizes, rejected.astype(int))
+        ends, sizes, rejected_steps = read_numeric(folder / "steps.csv")[1].T
+        steps = SolverSteps(np.append(signals.time[0], ends), sizes, rejected_steps.astype(int))
     names, events = {name: name for name in signals.columns}, signals.events
     if spec.fmu.is_file():  # it describes the variables, and names the contact of a column `mode`
         with suppress(HarnessError):

@@ -89,10 +89,12 @@ def convert_number(variable: Any, value: Any) -> float | int:
     if not in_range or (is_integer and not float(value).is_integer()):
         low_word, high_word = "above" if excludes_low else "at least", "below" if excludes_high else "at most"
         bounds = [f"{word} {limit!r}" for word, limit in ((low_word, low), (high_word, high)) if limit is not None]
-        allowed = " and ".join(bounds) + (f" {variable_unit(variable)}" if variable_unit(variable) else "")
+        range_text = " and ".join(bounds) + (f" {variable_unit(variable)}" if variable_unit(variable) else "")
         if is_integer or not bounds:
-            allowed = ", ".join([f"any {'whole' if is_integer else 'finite'} number", *([allowed] if bounds else [])])
-        raise SceneError(f"{variable.name} = {format_value(value)} is outside its range; allowed: {allowed}")
+            range_text = ", ".join(
+                [f"any {'whole' if is_integer else 'finite'} number", *([range_text] if bounds else [])]
+            )
+        raise SceneError(f"{variable.name} = {format_value(value)} is outside its range; allowed: {range_text}")
     return int(value) if is_integer else float(value)
 
 

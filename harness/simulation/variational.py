@@ -60,11 +60,11 @@ from .variational_loop import (
     RunStruct,
     load_library,
 )
-from .variational_solution import EventDerivative, Undefined, VariationalSolution
+from .variational_solution import EventDerivative, UndefinedDerivative, VariationalSolution
 
-EXTENDED, DENSE, SAMPLES = 16, 8, 9  # stages with those of the interpolant, rows of two buffers
+EXTENDED_STAGES, DENSE, SAMPLES = 16, 8, 9  # stages with those of the interpolant, rows of two buffers
 MAX_STEPS, STEPS_PER_CHECK = 1_000_000, 1000
-LOGGED = 64  # events until the logs are read
+LOG_SIZE = 64  # events until the logs are read
 DEFAULT_RTOL = 1e-11
 SHIFT = 1e-3  # of a parameter, for differences of an event indicator
 NEAR = 1e-10  # of the duration: times this close coincide
@@ -76,7 +76,7 @@ RESET = 100.0  # in tolerances: smaller changes of the states at the start are e
 
 
 @dataclass
-class Known:
+class VariedParameter:
     """A parameter: its variable, its value, and how it is changed.
 
     Attributes
@@ -175,12 +175,12 @@ class VariationalRun:
         self.columns = {name: np.asarray(column, dtype=float) for name, column in spec.inputs.items()}
         self.settings = {variables[name]: value for name, value in spec.values.items()}
         self.states = states
-        self.knowns = [
-            Known(item, *(group.index(item) if item in group else -1 for group in (states, self.inputs)))
+        self.varied_parameters = [
+            VariedParameter(item, *(group.index(item) if item in group else -1 for group in (states, self.inputs)))
             for item in map(variables.__getitem__, parameters)
         ]
-        calculated = {unknown.variable.name for unknown in description.initialUnknowns}
-        self.calculated = [i for i, state in enumerate(states) if state.name in calculated]
+        calculated_names = {unknown.variable.name for unknown in description.initialUnknowns}
+        self.calculated_states = [i for i, state in enumerate(states) if state.name in calculated_names]
         self.modes = tuple(read_model_data(spec.fmu).contacts.values())
         self.update = self.fmu.newDiscreteStates if instance.is_fmi2 else self.fmu.updateDiscreteStates
         self.n, self.m, self.q = len(states), len(parameters), int(description.numberOfEventIndicators or 0)
@@ -195,7 +195,7 @@ class VariationalRun:
         size, rates = max(n * (1 + m), 1), groups["rates"]
         self.times = np.asarray(self.spec.times, dtype=float)
         self.arrays: dict[str, np.ndarray] = {
-            "k": np.zeros((EXTENDED, size)),
+            "k": np.zeros((EXTENDED_STAGES, size)),
             "dense": np.zeros((DENSE, size)),
             "nominals": np.ones(max(n, 1)),
             "positions": np.array([rates.index(item) if item in rates else -1 for item in groups["states"]], np.int64),
@@ -216,8 +216,10 @@ class VariationalRun:
         self.references = {name: instance.make_references(group) for name, group in groups.items()}
         self.structs = (ParameterStruct * max(m, 1))(
             *(
-                ParameterStruct(known.variable.valueReference, known.state >= 0, known.input, kind=known.kind)
-                for known in self.knowns
+                ParameterStruct(
+                    parameter.variable.valueReference, parameter.state >= 0, parameter.input, kind=parameter.kind
+                )
+                for parameter in self.varied_parameters
             )
         )
         self.change_values({})
@@ -249,24 +251,24 @@ class VariationalRun:
     def change_values(self, values: Mapping[str, float]) -> None:
         """Give variables other values in the following runs, by name."""
         self.settings |= {self.instance.variables[name]: value for name, value in values.items()}
-        for struct, known in zip(self.structs, self.knowns, strict=False):
-            if known.input < 0:
-                known.value = float(self.settings.get(known.variable, known.variable.start or 0.0))
-            struct.value = known.value
+        for struct, parameter in zip(self.structs, self.varied_parameters, strict=False):
+            if parameter.input < 0:
+                parameter.value = float(self.settings.get(parameter.variable, parameter.variable.start or 0.0))
+            struct.value = parameter.value
 
     def allocate_logs(self) -> None:
         """Allocate the logs of events and of times without derivatives, and the table of inputs."""
-        m, notes = self.m, LOGGED + 3 * (self.q + self.m)
-        split = (LOGGED, 2, 1 + m, len(self.spec.outputs))
+        m, notes = self.m, LOG_SIZE + 3 * (self.q + self.m)
+        split_shape = (LOG_SIZE, 2, 1 + m, len(self.spec.outputs))
         signals = (
             [self.columns[name] for name in (TIME, *(variable.name for variable in self.inputs))] if self.inputs else []
         )
         self.arrays |= {
-            "event_values": np.zeros((LOGGED, 1 + m)),
-            "event_codes": np.zeros((LOGGED, 1 + 2 * len(self.modes)), dtype=np.int64),
+            "event_values": np.zeros((LOG_SIZE, 1 + m)),
+            "event_codes": np.zeros((LOG_SIZE, 1 + 2 * len(self.modes)), dtype=np.int64),
             "note_values": np.zeros((notes, 1 + m)),
             "note_codes": np.zeros((notes, 2), dtype=np.int64),
-            "split_values": np.zeros(split),
+            "split_values": np.zeros(split_shape),
             "signals": np.ascontiguousarray(np.transpose(signals)) if signals else np.zeros((1, 1)),
         }
 
@@ -279,24 +281,24 @@ class VariationalRun:
             getattr(self.fmu, name)(values, count)
         return np.array(values)
 
-    def start_slopes(self, known: Known) -> np.ndarray:
+    def start_slopes(self, parameter: VariedParameter) -> np.ndarray:
         """Return the derivatives (n,) of the states at the start, in initialization mode."""
         slopes = np.zeros(self.n)
-        if known.state >= 0:
-            slopes[known.state] = 1.0
-        elif known.is_set and self.calculated:
-            unknowns = [self.states[i].valueReference for i in self.calculated]
-            reference = known.variable.valueReference
-            slopes[self.calculated] = self.fmu.getDirectionalDerivative(unknowns, [reference], [1.0])
+        if parameter.state >= 0:
+            slopes[parameter.state] = 1.0
+        elif parameter.is_set and self.calculated_states:
+            unknowns = [self.states[i].valueReference for i in self.calculated_states]
+            reference = parameter.variable.valueReference
+            slopes[self.calculated_states] = self.fmu.getDirectionalDerivative(unknowns, [reference], [1.0])
         return slopes
 
     def failure(self, reason: str) -> HarnessError:
         """Return the error of a run that failed, with the message of the FMU if there is one."""
         return HarnessError(self.instance.log.error_message or f"{self.spec.fmu.name}: {reason}")
 
-    def initialize(self, changed: Known | None = None, change: float = 0.0) -> None:
+    def initialize(self, parameter: VariedParameter | None = None, change: float = 0.0) -> None:
         """Enter the initialization of the instance, with another value of one parameter."""
-        settings = self.settings | ({changed.variable: changed.value + change} if changed else {})
+        settings = self.settings | ({parameter.variable: parameter.value + change} if parameter else {})
         self.instance.restart()
         stop = self.stop + 2.0 * self.tolerance
         self.instance.enter_initialization(settings.items(), self.start, stop, TIGHTER * self.spec.rtol)
@@ -304,46 +306,46 @@ class VariationalRun:
 
     # ---- the run
 
-    def start_indicators(self, known: Known | None = None, change: float = 0.0) -> np.ndarray | None:
+    def start_indicators(self, parameter: VariedParameter | None = None, change: float = 0.0) -> np.ndarray | None:
         """Return the event indicators (q,) at the start of a run with a changed parameter; None if the FMU refuses."""
-        if known:
-            low, high = find_bound(known.variable, "min"), find_bound(known.variable, "max")
-            value = known.value + change
+        if parameter:
+            low, high = find_bound(parameter.variable, "min"), find_bound(parameter.variable, "max")
+            value = parameter.value + change
             if (low is not None and value < low) or (high is not None and value > high):
                 return None
         try:
-            self.initialize(known, change)
+            self.initialize(parameter, change)
             self.fmu.exitInitializationMode()
             update_discrete_states(self.update, self.start)
             self.fmu.enterContinuousTimeMode()
         except CALL_FAILURES:
-            if known is None:
+            if parameter is None:
                 raise
             return None
         return self.read("getEventIndicators", self.q)
 
-    def find_side(self, known: Known) -> int | None:
-        """Return which neighbouring values of a parameter the FMU takes, as `Known.side`."""
-        sides = [side for side in (1, -1) if self.start_indicators(known, side * known.shift) is not None]
+    def find_side(self, parameter: VariedParameter) -> int | None:
+        """Return which neighbouring values of a parameter the FMU takes, as `VariedParameter.side`."""
+        sides = [side for side in (1, -1) if self.start_indicators(parameter, side * parameter.shift) is not None]
         return 0 if len(sides) == 2 else sides[0] if sides else None
 
-    def starts_otherwise(self, known: Known, base: np.ndarray) -> bool:
+    def starts_otherwise(self, parameter: VariedParameter, base: np.ndarray) -> bool:
         """Return whether neighbouring start values lead to other modes, so that an indicator (q,) jumps."""
         for side in (1.0, -1.0):
-            near, nearer = (self.start_indicators(known, side * h * known.shift) for h in (1.0, 1.0 / 16.0))
+            near, nearer = (self.start_indicators(parameter, side * h * parameter.shift) for h in (1.0, 1.0 / 16.0))
             if near is not None and nearer is not None:
                 jump = np.abs(nearer - base)
                 if np.any((jump > 0.5 * np.abs(near - base)) & (jump > 1e-6 * np.abs(base))):
                     return True
         return False
 
-    def save_starts(self, known: Known, struct: ParameterStruct) -> None:
+    def save_starts(self, parameter: VariedParameter, struct: ParameterStruct) -> None:
         """Save runs that have started with neighbouring values of a parameter that can be set before the start only."""
-        if known.kind != FIXED or known.side is None or not self.can_save:
+        if parameter.kind != FIXED or parameter.side is None or not self.can_save:
             return
-        struct.change = (known.side or 1) * FIXED_SHIFT * known.shift
-        for i, share in enumerate((0.0, 0.5, 1.0) if known.side else (0.0, 0.5, 1.0, -0.5, -1.0)):
-            if self.start_indicators(known, share * struct.change) is not None:
+        struct.change = (parameter.side or 1) * FIXED_SHIFT * parameter.shift
+        for i, share in enumerate((0.0, 0.5, 1.0) if parameter.side else (0.0, 0.5, 1.0, -0.5, -1.0)):
+            if self.start_indicators(parameter, share * struct.change) is not None:
                 struct.starts[i] = self.fmu.getFMUState()
 
     def free_starts(self) -> None:
@@ -358,18 +360,26 @@ class VariationalRun:
         """Initialize the instance and the derivatives of its states."""
         base = self.start_indicators()
         assert base is not None
-        for known in self.knowns if self.q else ():
-            if known.is_set and known.side is None:  # of runs with other values, only the first one looks
-                known.side = self.find_side(known)
-        for struct, known in zip(self.structs, self.knowns, strict=False):
-            struct.side = NO_SIDE if known.side is None else known.side
-            self.save_starts(known, struct)
+        for parameter in self.varied_parameters if self.q else ():
+            if parameter.is_set and parameter.side is None:  # of runs with other values, only the first one looks
+                parameter.side = self.find_side(parameter)
+        for struct, parameter in zip(self.structs, self.varied_parameters, strict=False):
+            struct.side = NO_SIDE if parameter.side is None else parameter.side
+            self.save_starts(parameter, struct)
         self.initialize()
-        for i, known in enumerate(self.knowns):
-            self.slopes[i] = self.start_slopes(known)
-        moved = [known for known, slopes in zip(self.knowns, self.slopes, strict=True) if self.q and slopes.any()]
-        if moved:
-            jumps = [known for known in moved if known.input < 0 and self.starts_otherwise(known, base)]
+        for i, parameter in enumerate(self.varied_parameters):
+            self.slopes[i] = self.start_slopes(parameter)
+        start_parameters = [
+            parameter
+            for parameter, slopes in zip(self.varied_parameters, self.slopes, strict=True)
+            if self.q and slopes.any()
+        ]
+        if start_parameters:
+            jumps = [
+                parameter
+                for parameter in start_parameters
+                if parameter.input < 0 and self.starts_otherwise(parameter, base)
+            ]
             self.initialize()
         self.fmu.exitInitializationMode()
         before = self.read("getContinuousStates", self.n)
@@ -385,13 +395,15 @@ class VariationalRun:
         self.arrays["largest"][:] = np.abs(self.arrays["z"])
         self.arrays["largest_g"][:] = 0.0
         self.events: list[EventDerivative] = []
-        self.undefined: list[Undefined] = []
+        self.undefined_derivatives: list[UndefinedDerivative] = []
         self.sides = np.zeros(self.m)  # 0: derivatives exist; 1 or -1: for an increase or a decrease alone; NaN: none
         self.side_rows: list[tuple[int, np.ndarray]] = []  # number of rows before the sides changed
         self.one_sided: list[tuple[int, np.ndarray, np.ndarray]] = []  # row, derivatives from the left and right
         if np.any(np.abs(self.y - before) > RESET * self.spec.rtol * np.abs(before)):
             self.undefine(self.start, -1, "the states change at the start", np.full(self.m, nan))
-        others = np.array([nan if moved and known in jumps else 0.0 for known in self.knowns])
+        others = np.array(
+            [nan if start_parameters and parameter in jumps else 0.0 for parameter in self.varied_parameters]
+        )
         self.undefine(self.start, -1, "nearby values start in another mode", others)
         zeros = np.zeros(self.m)
         self.check(self.library.check_ties(byref(run), c_int64(-1), c_void_p(zeros.ctypes.data), c_double(0.0)))
@@ -451,8 +463,8 @@ class VariationalRun:
             return
         run, at = self.run, f"at t = {self.run.t:.9g} s"
         if status == NO_NEIGHBOUR:
-            known = self.knowns[run.indicator]
-            raise self.failure(f"it takes no value next to {known.variable.name} = {known.value!r}")
+            parameter = self.varied_parameters[run.indicator]
+            raise self.failure(f"it takes no value next to {parameter.variable.name} = {parameter.value!r}")
         raise self.failure(
             {
                 STEP_EVENT: f"it has an event {at} that no event indicator locates",
@@ -471,27 +483,27 @@ class VariationalRun:
 
     def read_logs(self) -> None:
         """Read and empty the logs of events, and of times without derivatives."""
-        run, logs, count, split = self.run, self.arrays, len(self.modes), 0
+        run, logs, count, n_splits = self.run, self.arrays, len(self.modes), 0
         for values, codes in zip(logs["event_values"][: run.n_events], logs["event_codes"].tolist(), strict=False):
             before, after = tuple(codes[1 : 1 + count]), tuple(codes[1 + count :])
             self.events.append(EventDerivative(float(values[0]), codes[0], before, after, values[1:].copy()))
         for values, codes in zip(logs["note_values"][: run.n_notes].copy(), logs["note_codes"].tolist(), strict=False):
             indicator, reason = codes
             if reason == RECORDED:
-                self.split_row(int(values[0]), values[1:], indicator, *logs["split_values"][split])
-                split += 1
+                self.split_row(int(values[0]), values[1:], indicator, *logs["split_values"][n_splits])
+                n_splits += 1
             else:
                 self.undefine(float(values[0]), indicator, REASONS[reason], values[1:])
         run.n_events = run.n_notes = run.n_splits = 0
 
     def undefine(self, t: float, indicator: int, reason: str, sides: np.ndarray) -> None:
         """Note that derivatives do not exist from a time in s on (0: they do; 1, -1: for one side; NaN: for none)."""
-        if not (concerned := (sides != 0.0) & ~np.isnan(self.sides)).any():
+        if not (is_concerned := (sides != 0.0) & ~np.isnan(self.sides)).any():
             return
-        names = tuple(name for name, is_one in zip(self.parameters, concerned, strict=True) if is_one)
-        self.undefined.append(Undefined(t, indicator, reason, names))
+        names = tuple(name for name, is_affected in zip(self.parameters, is_concerned, strict=True) if is_affected)
+        self.undefined_derivatives.append(UndefinedDerivative(t, indicator, reason, names))
         agree = (self.sides == 0.0) | (self.sides == sides)
-        self.sides = np.where(concerned, np.where(agree, sides, nan), self.sides)
+        self.sides = np.where(is_concerned, np.where(agree, sides, nan), self.sides)
         self.side_rows.append((int(np.searchsorted(self.times, t - self.tolerance)), self.sides))
 
     def split_row(self, row: int, slopes: np.ndarray, indicator: int, early: np.ndarray, late: np.ndarray) -> None:
@@ -504,9 +516,11 @@ class VariationalRun:
         after = np.where(jumps & (slopes != 0.0)[:, None], nan, late[1:])
         sides = np.where(is_delayed, after, early[1:]), np.where(is_delayed, early[1:], after)
         self.one_sided.append((row, *sides))
-        if (concerned := (sides[0] != sides[1]).any(axis=1)).any():
-            names = tuple(np.array(self.parameters)[concerned].tolist())
-            self.undefined.append(Undefined(float(self.times[row]), indicator, "an event happens then", names, True))
+        if (is_concerned := (sides[0] != sides[1]).any(axis=1)).any():
+            names = tuple(np.array(self.parameters)[is_concerned].tolist())
+            self.undefined_derivatives.append(
+                UndefinedDerivative(float(self.times[row]), indicator, "an event happens then", names, True)
+            )
 
     def make_solution(self) -> VariationalSolution:
         """Return the solution up to the stop."""
@@ -517,13 +531,15 @@ class VariationalRun:
             right[begin:, (sides == -1.0) | np.isnan(sides)] = nan
         for index, before, after in self.one_sided:
             left[index], right[index] = before, after
-        used = np.asarray(rows[:, 1:].any(axis=(0, 2)) | self.slopes.any(axis=1))
+        is_used = np.asarray(rows[:, 1:].any(axis=(0, 2)) | self.slopes.any(axis=1))
         for event in self.events:
-            used |= event.slopes != 0.0
-        for item in self.undefined:
-            used |= np.isin(self.parameters, item.parameters)
+            is_used |= event.slopes != 0.0
+        for item in self.undefined_derivatives:
+            is_used |= np.isin(self.parameters, item.parameters)
         counts = int(self.run.n_steps), int(self.run.n_rhs)
-        return VariationalSolution(rows[:, 0].copy(), left, right, used, (*self.events,), (*self.undefined,), *counts)
+        return VariationalSolution(
+            rows[:, 0].copy(), left, right, is_used, (*self.events,), (*self.undefined_derivatives,), *counts
+        )
 
 
 def differentiate(

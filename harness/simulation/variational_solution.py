@@ -29,7 +29,7 @@ class EventDerivative:
 
 
 @dataclass(frozen=True)
-class Undefined:
+class UndefinedDerivative:
     """A time in s from which derivatives by some parameters (k,) do not exist, its indicator (-1: none), and why.
 
     If `is_moment`, they exist again after this time.
@@ -53,9 +53,9 @@ class VariationalSolution:
     left, right : numpy.ndarray
         Derivatives (times, parameters, outputs) for decreasing and for increasing parameters, NaN where they do not
         exist. The derivative exists where they are equal.
-    used : numpy.ndarray
+    is_used : numpy.ndarray
         Whether something depends on each parameter (parameters,).
-    events, undefined
+    events, undefined_derivatives
         Events, and times at which derivatives cease to exist.
     n_steps, n_rhs : int
         Steps, and evaluations of the right-hand side.
@@ -64,8 +64,8 @@ class VariationalSolution:
     values: np.ndarray
     left: np.ndarray
     right: np.ndarray
-    used: np.ndarray
+    is_used: np.ndarray
     events: tuple[EventDerivative, ...]
-    undefined: tuple[Undefined, ...]
+    undefined_derivatives: tuple[UndefinedDerivative, ...]
     n_steps: int
     n_rhs: int

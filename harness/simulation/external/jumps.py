@@ -31,28 +31,28 @@ def match_jumps(
 ) -> list[tuple[Interval, Interval]]:
     """Return the communication steps of the jumps that both runs have; times differ by at most `longest` in s."""
     pairs, begin = [], 0
-    for one, size in first:
+    for interval, size in first:
         for i in range(begin, len(second)):
             other, other_size = second[i]
-            if other[0] - one[1] > longest:
+            if other[0] - interval[1] > longest:
                 break
             is_same = abs(size - other_size) <= SIZE_DIFFERENCE * max(abs(size), abs(other_size))
-            if is_same and distance(one, other) <= longest:
-                pairs.append((one, other))
+            if is_same and distance(interval, other) <= longest:
+                pairs.append((interval, other))
                 begin = i + 1
                 break
     return pairs
 
 
-def distance(one: Interval, other: Interval) -> float:
+def distance(interval: Interval, other: Interval) -> float:
     """Return by how much the times in two intervals differ at least, in s; 0 if they overlap."""
-    return max(0.0, other[0] - one[1], one[0] - other[1])
+    return max(0.0, other[0] - interval[1], interval[0] - other[1])
 
 
 def is_between(times: np.ndarray, pairs: list[tuple[Interval, Interval]], tolerance: float) -> np.ndarray:
     """Return the mask (n,) of the times in s at which a jump has taken place in one run and not in the other."""
     mask = np.zeros(len(times), bool)
-    for one, other in pairs:
-        begin, end = min(one[0], other[0]), max(one[1], other[1])
+    for interval, other in pairs:
+        begin, end = min(interval[0], other[0]), max(interval[1], other[1])
         mask |= (times > begin + tolerance) & (times <= end + tolerance)
     return mask

@@ -52,12 +52,12 @@ class ChildSession:
         The run.
     description : ModelDescription
         Model description of the FMU.
-    varied : sequence of str
+    varied_names : sequence of str
         Variables whose values differ from run to run.
     """
 
-    def __init__(self, spec: RunSpec, description: Any, varied: Sequence[str] = ()) -> None:
-        self.spec, self.description, self.varied = spec, description, varied
+    def __init__(self, spec: RunSpec, description: Any, varied_names: Sequence[str] = ()) -> None:
+        self.spec, self.description, self.varied_names = spec, description, varied_names
         self.variables: Values = {variable.name: variable for variable in description.modelVariables}
         self.exchange = spec.exchange or description.coSimulation is None
         interface = description.modelExchange if self.exchange else description.coSimulation
@@ -93,7 +93,7 @@ class ChildSession:
         HarnessError
             If there is no result at all.
         """
-        spec = replace(self.spec, values={**self.spec.values, **dict(zip(self.varied, point, strict=True))})
+        spec = replace(self.spec, values={**self.spec.values, **dict(zip(self.varied_names, point, strict=True))})
         self.check_interface()
         values = convert_values(spec, self.variables)
         check_inputs(spec.inputs, self.variables, spec.values)
@@ -102,21 +102,21 @@ class ChildSession:
         start, stop = check_time_span(spec, self.description)
         report(0.0)
         inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}
-        resolved = replace(spec, exchange=self.exchange, start=start, stop=stop, values=values, inputs=inputs)
+        resolved_spec = replace(spec, exchange=self.exchange, start=start, stop=stop, values=values, inputs=inputs)
         with temporary_directory("rows-") as directory:
-            outcome, output = self.call_worker(resolved, directory, report)
+            outcome, output = self.call_worker(resolved_spec, directory, report)
             is_fmi2 = self.description.fmiVersion == "2.0"
             time, columns = read_longest_rows(directory, outcome.run_number, selection, is_fmi2)
             texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
-        failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
-        if failed and len(time) and " at t = " not in failed:
-            failed += f", after t = {time[-1]:.9g} s"
+        failure = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
+        if failure and len(time) and " at t = " not in failure:
+            failure += f", after t = {time[-1]:.9g} s"
         if len(time) < 2:
-            raise HarnessError(failed or f"{spec.fmu.name} returns no values")
+            raise HarnessError(failure or f"{spec.fmu.name} returns no values")
         note_on_output = f"it printed: {output[-1][:MAX_VALUE_LENGTH]}" if output else ""
         note = "; ".join(filter(None, (outcome.note, note_on_output)))
         trajectory = build_trajectory(spec, self.variables, values, selection, time, columns, texts)
-        return replace(trajectory, note=note, failure=failed)
+        return replace(trajectory, note=note, failure=failure)
 
     def check_interface(self) -> None:
         """Check that the FMU offers the interface, and that its clocks can tick."""
@@ -227,7 +227,7 @@ def build_trajectory(
     values: Values,
     selection: list[ShapedVariable],
     time: np.ndarray,
-    recorded: Columns,
+    recorded_columns: Columns,
     texts: list[str],
 ) -> Trajectory:
     """Build the trajectory of a run from the recorded columns."""
@@ -235,7 +235,7 @@ def build_trajectory(
     for variable, shape in selection:
         for name in element_names(variable.name, shape):
             if name in spec.outputs or variable.name in spec.outputs:
-                column = recorded[name]
+                column = recorded_columns[name]
                 columns[name] = np.array(texts)[column] if variable.type == "String" else column
                 units[name], descriptions[name] = variable_unit(variable), variable.description or name
     parameters: Values = {}

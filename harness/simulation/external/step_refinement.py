@@ -49,7 +49,7 @@ class RefinementRun:
     time: np.ndarray
     columns: Columns
     message: str = ""
-    terminated: bool = False
+    is_terminated: bool = False
     step_refused: bool = False
 
 
@@ -187,8 +187,8 @@ def refine(
         return accept_run(fixed_run, f"declared fixed internal step of {fixed_step:g} s, error unknown")
     if requested_step:
         requested_run = run(requested_step, solver_tolerance(spec))
-        requested = f"step of {requested_step:g} s" if requested_step < inf else "times"
-        return accept_run(requested_run, f"requested communication {requested}, error unknown")
+        communication_text = f"step of {requested_step:g} s" if requested_step < inf else "times"
+        return accept_run(requested_run, f"requested communication {communication_text}, error unknown")
     result = refine_steps(spec, run, show)
     default_step = description.defaultExperiment.stepSize if description.defaultExperiment else None
     if result.run_number is None and default_step:  # no run advanced by a step
@@ -236,7 +236,7 @@ def refine_steps(spec: RunSpec, run: RunFunction, show: NoteCallback) -> Refinem
     previous: RefinementRun | None = None
     while h >= min(duration / MAX_STEPS, coarsest.h / 2):
         current = run(h, solver_tolerance(spec))
-        if current.message and not (current.terminated or current.step_refused):
+        if current.message and not (current.is_terminated or current.step_refused):
             return keep_longest_run(previous, current)
         if previous and not (current.step_refused or previous.step_refused):
             change = largest_change(previous, current, spec)
@@ -261,9 +261,9 @@ def reason_to_stop(convergence: Convergence, steps: float, tolerance: float) -> 
     if steps >= STEPS_TO_SEE_STAGNATION and convergence.stagnates:
         return "further halving does not reduce it"
     if steps >= STEPS_TO_SEE_ORDER:
-        required = log2(steps) + convergence.halvings_to(tolerance)
-        if required > log2(MAX_STEPS):
-            count = f"about {2.0**required:.1g}" if required < 100 else "too many"
+        log_steps = log2(steps) + convergence.halvings_to(tolerance)
+        if log_steps > log2(MAX_STEPS):
+            count = f"about {2.0**log_steps:.1g}" if log_steps < 100 else "too many"
             return f"the tolerance of {tolerance:g} needs {count} steps"
     return ""
 
@@ -301,19 +301,21 @@ def refine_solver_tolerance(
     short_step = min(integer_fraction(spec, STEPS_TO_SEE_INTERNAL_STEP), coarsest_grid(spec).h / 4)
     for _ in range(3):
         tolerance = max(tolerance / 100, MIN_TOLERANCE)
-        refined = run(short_step, tolerance)
-        if refined.message and not refined.terminated:
-            return keep_longest_run(current, refined)
-        change = largest_change(current, refined, spec)
+        refined_run = run(short_step, tolerance)
+        if refined_run.message and not refined_run.is_terminated:
+            return keep_longest_run(current, refined_run)
+        change = largest_change(current, refined_run, spec)
         if change.size == 0.0:
-            kind = find_internal_step(refined) or "internal steps"
+            kind = find_internal_step(refined_run) or "internal steps"
             reason = "neither shorter communication steps nor a smaller tolerance change the result"
-            return accept_run(refined, f"{kind}, error unknown: {reason}")
+            return accept_run(refined_run, f"{kind}, error unknown: {reason}")
         note = f"internal steps, controlled by a tolerance of {tolerance:.2g}"
         show(f"tolerance {tolerance:.1g}, error {change.size:.1g}")
         if change.size <= spec.rtol:
-            return accept_run(refined, f"{note}; a hundred times that changes no output by more than {change.size:.2g}")
-        current = refined
+            return accept_run(
+                refined_run, f"{note}; a hundred times that changes no output by more than {change.size:.2g}"
+            )
+        current = refined_run
         changes.append(change)
     return accept_inexact(spec, current, f"{note}; a hundred times that changes an output by {describe(changes[-1])}")
 
@@ -346,7 +348,7 @@ def refine_tolerance(spec: RunSpec, h: float, run: RunFunction, show: NoteCallba
     previous: RefinementRun | None = None
     for _ in range(MAX_TOLERANCE_REDUCTIONS):
         current = run(h, rtol)
-        if current.message and not current.terminated:
+        if current.message and not current.is_terminated:
             return keep_longest_run(previous, current)
         note = f"fmpy's CVode at rtol {rtol:.2g}"
         if previous:

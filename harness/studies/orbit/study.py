@@ -75,12 +75,16 @@ class BranchTracer:
 
     def set_value(self, value: float) -> None:
         """Set the varied parameter, if there is one."""
-        if self.oscillator.varied:
+        if self.oscillator.varied_names:
             self.oscillator.set_point([value])
 
     def name_value(self, value: float) -> str:
         """Return the value with the name of the parameter."""
-        return f"{self.oscillator.varied[0]} = {value:.6g}" if self.oscillator.varied else self.oscillator.spec.model
+        return (
+            f"{self.oscillator.varied_names[0]} = {value:.6g}"
+            if self.oscillator.varied_names
+            else self.oscillator.spec.model
+        )
 
     def describe_steady_sliding(self, steady: SteadySliding) -> Motion:
         """Return steady sliding; its period is that of small oscillations around it."""

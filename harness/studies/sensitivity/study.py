@@ -147,10 +147,10 @@ def name_indicator(contacts: Sequence[str], indicator: int) -> str:
 
 def describe_exceptions(fmu: Path, solution: VariationalSolution, parameters: Sequence[str]) -> tuple[str, ...]:
     """Return sentences on parameters without an effect, and on times without derivatives."""
-    unused = [name for name, is_used in zip(parameters, solution.used, strict=True) if not is_used]
+    unused = [name for name, is_used in zip(parameters, solution.is_used, strict=True) if not is_used]
     remarks = [f"Nothing depends on {', '.join(unused)}: all derivatives are zero."] if unused else []
     contacts = list(read_model_data(fmu).contacts)
-    for item in solution.undefined:
+    for item in solution.undefined_derivatives:
         where, names = "at" if item.is_moment else "from", ", ".join(item.parameters)
         name = f" ({name_indicator(contacts, item.indicator)})" if item.indicator >= 0 else ""
         remarks.append(f"No derivative by {names} {where} t = {item.t:.9g} s: {item.reason}{name}.")
