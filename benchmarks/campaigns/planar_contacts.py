@@ -328,7 +328,7 @@ def main(arguments: list[str]) -> int:
 
 def run_campaign(n_closed: int, n_driven: int, n_exchange: int) -> int:
     """Run this many motions of each kind; return 1 if one differs or fails."""
-    puck = build_cache.build_once("puck-native", "puck", *NATIVE) / "puck.fmu"
+    puck = build_cache.build_once("puck", *NATIVE) / "puck.fmu"
     failures, largest, largest_exchanged = 0, np.zeros(4), np.zeros(2)
     for n, scene in enumerate(random_scenes(n_closed)):
         try:

@@ -89,17 +89,19 @@ class LoweredModuleFinder(MetaPathFinder, Loader):
 def complete_tree(node: Any, line: int = 1, context: ast.expr_context = LOAD) -> Any:
     """Return a copy of a tree with line numbers and contexts, for the compiler; nodes without a line have that of their
     statement."""
-    line, copy = getattr(node, "lineno", line), type(node)()
+    line = getattr(node, "lineno", line)
     stored = DELETE if isinstance(node, ast.Delete) else STORE
+    fields = {}
     for name, value in ast.iter_fields(node):
         inner = stored if name in TARGETS else context if isinstance(node, GROUPS) else LOAD
         if isinstance(value, list):
             value = [complete_tree(part, line, inner) if isinstance(part, ast.AST) else part for part in value]
         elif isinstance(value, ast.AST) and name != "ctx":
             value = complete_tree(value, line, inner)
-        setattr(copy, name, value)
-    if "ctx" in copy._fields:
-        copy.ctx = context
+        fields[name] = value
+    if "ctx" in node._fields:
+        fields["ctx"] = context
+    copy = type(node)(**fields)
     if "lineno" in copy._attributes:
         copy.lineno, copy.col_offset = line, 0
     return copy
