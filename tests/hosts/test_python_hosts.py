@@ -91,6 +91,27 @@ def request(resources, name, values, stop):
     }
 
 
+TRANSLATION = """\
+import sys
+
+sys.path.insert(0, sys.argv[1])
+from fmus.compiler.lowering.import_hook import lowered_model
+from fmus.packaging.native.model_header import render_model_header
+
+render_model_header(lowered_model("stickslip"), "3")
+"""
+
+
+def test_the_newest_python_translates_a_model_without_warnings():
+    """It warns of what a later one refuses, and the tests count warnings as errors."""
+    python = interpreter(PYTHONS[-1])
+    if python is None:
+        pytest.skip(f"there is no Python {PYTHONS[-1]} here")
+    command = [python, "-I", "-W", "error", "-c", TRANSLATION, ROOT]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.fixture(scope="module")
 def requests(fmus, tmp_path_factory):
     """One run of every case on the unpacked FMUs: the request, the output names, and the rows from this Python."""
@@ -108,7 +129,7 @@ def requests(fmus, tmp_path_factory):
     return collected
 
 
-@pytest.mark.campaign
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [PYTHONS[0], PYTHONS[-1]])
 def test_the_embedded_code_behaves_alike_on_the_oldest_and_newest_python(requests, version):
     """The other tests use a version in between."""
