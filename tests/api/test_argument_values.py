@@ -21,7 +21,7 @@ pytest.importorskip("xarray")
 ABOVE_ZERO = {"0.5", "1e300", "0-d array"}
 FINITE = {"0", "-1", *ABOVE_ZERO}
 FLAG = {"True", "np.bool"}
-NOTHING = {"[]", "{}"}  # of names
+NO_NAMES = {"[]", "{}"}  # of names
 ACCEPTED_VALUES = {  # arguments by function, and the values that they may have; None as well if it is the default
     "simulate": {
         "values": {"{}"},
@@ -55,8 +55,8 @@ ACCEPTED_VALUES = {  # arguments by function, and the values that they may have;
         "backlash": {"0"},
     },
     "fit": {
-        "observe": {"'x'", *NOTHING},
-        "inputs": NOTHING,
+        "observe": {"'x'", *NO_NAMES},
+        "inputs": NO_NAMES,
         "values": {"{}"},
         "sigma": {"{}", "{'x': 5}"},
         "start": {"{}"},

@@ -145,7 +145,7 @@ import numpy as np
 def simulate(scene, setting):
     print("noise of an engine")
     if scene.name == "sled":
-        os.kill(os.getpid(), 9) if setting["how"] == "dies" else time.sleep(600)
+        os.kill(os.getpid(), 9) if setting["ending"] == "dies" else time.sleep(600)
     return Solution(scene.times, np.zeros((len(scene.times), 3)), steps=1)
 sys.modules[child.__package__ + ".engines.broken"] = sys.modules[__name__]
 def run_case(case):
@@ -154,15 +154,15 @@ def run_case(case):
 
 
 @pytest.mark.parametrize(
-    ("how", "reason"),
+    ("ending", "reason"),
     [
         ("dies", "it ended with exit status -9: noise of an engine"),
         pytest.param("hangs", "no answer after 8 s", marks=pytest.mark.campaign),
     ],
 )
-def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(make_module, monkeypatch, how, reason):
+def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(make_module, monkeypatch, ending, reason):
     monkeypatch.setattr(study, "run_case", make_module("broken_rival", BROKEN_ENGINE).run_case)
-    replies = run_in_child([RivalCase("broken", name, {"how": how}) for name in ("rest", "sled", "held")], 8.0)
+    replies = run_in_child([RivalCase("broken", name, {"ending": ending}) for name in ("rest", "sled", "held")], 8.0)
     assert [reply.gap for reply in replies] == ["", reason, ""]
 
 

@@ -162,12 +162,12 @@ def test_signals_at_many_moments_of_a_wait_leave_no_lock_held(handled_sigint, mo
     try:
         for moment in range(300):
             interrupt.RECEIVED_SIGNALS.clear()
-            pending = Future()
+            future = Future()
             with suppress(KeyboardInterrupt):
                 signal.setitimer(signal.ITIMER_REAL, 1e-6 * (moment + 1))
                 while not interrupt.RECEIVED_SIGNALS:
-                    wait_for_any([pending])
-            other = threading.Thread(target=pending.cancel, daemon=True)
+                    wait_for_any([future])
+            other = threading.Thread(target=future.cancel, daemon=True)
             other.start()
             other.join(timeout=10)
             assert not other.is_alive()
@@ -187,9 +187,9 @@ def test_a_program_that_times_out_ends_with_all_its_children(tmp_path, monkeypat
     monkeypatch.setattr(
         "harness.process.subprocess_runner.monotonic", lambda: float(bool(select.select([reader], [], [], 0)[0]))
     )
-    with pytest.raises(SubprocessTimeoutError, match=r"no answer after 0\.5 s") as late:
+    with pytest.raises(SubprocessTimeoutError, match=r"no answer after 0\.5 s") as error:
         run_subprocess(["sh", "-c", f"echo so far; exec 3> '{tmp_path}/pipe'; sleep 100 & echo >&3; wait"], timeout=0.5)
-    assert late.value.process.stdout == "so far\n"
+    assert error.value.process.stdout == "so far\n"
     os.set_blocking(reader, True)
     assert os.read(reader, 9) == b"\n"
     assert os.read(reader, 1) == b""  # the end of the pipe: no child lives

@@ -35,10 +35,10 @@ def test_docstrings_describe_parameters_that_exist(package):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 names = described_parameters(ast.get_docstring(node) or "")
-                existing = signature_names(node)
+                parameters = signature_names(node)
                 n_described += len(names)
                 mistakes += [
-                    f"{path}: {node.name} has no {name}" for name in names if existing and name not in existing
+                    f"{path}: {node.name} has no {name}" for name in names if parameters and name not in parameters
                 ]
     assert n_described > 100
     assert mistakes == []

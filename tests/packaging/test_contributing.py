@@ -52,9 +52,9 @@ def apply_change(text, change):
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("what", ["model", "law", "method", "command", "test"])
-def test_an_addition_is_a_diff_of_one_file(what):
-    (part,) = (part for part in PAGE.split("\n## ") if part.startswith(f"A {what}\n"))
+@pytest.mark.parametrize("addition", ["model", "law", "method", "command", "test"])
+def test_an_addition_is_a_diff_of_one_file(addition):
+    (part,) = (part for part in PAGE.split("\n## ") if part.startswith(f"A {addition}\n"))
     assert len({name for kind, name, _ in BLOCK.findall(part) if kind != "sh"}) == 1
 
 

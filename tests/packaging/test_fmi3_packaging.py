@@ -51,7 +51,7 @@ def inspect(fmu, tmp_path_factory):
     requests += [("factors", name, PARAMETERS.get(name, {})) for name in model_names()] + [
         ("nominals", "pacejka", "x_m", 1e-5)
     ]
-    calls = [(function, fmu(name), *more) for function, name, *more in requests]
+    calls = [(function, fmu(name), *arguments) for function, name, *arguments in requests]
     answers = worker_client.run_script(
         Path(__file__).with_name("fmi3_inspection.py"), "call_each", calls, folder=tmp_path_factory.mktemp("fmi3")
     )
@@ -139,9 +139,11 @@ def test_the_structure_lists_all_unknowns_in_schema_order(fmu, name):
 
 @EVERY_MODEL
 def test_only_the_speed_may_jump_and_only_with_dry_friction(fmu, name):
-    jumping = [element.get("name") for element in description_of(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
+    jump_names = [
+        element.get("name") for element in description_of(fmu(name)).findall("ModelVariables/*[@reinit='true']")
+    ]
     _, speed, *_ = [variable for variable, meaning in variables(scalar_class(name)()) if meaning.causality == "output"]
-    assert jumping == ([speed] if name in DRY else [])
+    assert jump_names == ([speed] if name in DRY else [])
 
 
 @EVERY_MODEL

@@ -309,10 +309,10 @@ def test_a_failed_write_leaves_the_previous_fmu_and_nothing_else(tmp_path, monke
     older = tmp_path / "smd.fmu"
     older.write_bytes(b"older")
 
-    def full(self, target):
+    def fail(self, target):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(Path, "replace", fail)
     with pytest.raises(BuildError, match="No space left on device"):
         write(older, b"newer")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"smd.fmu": b"older"}

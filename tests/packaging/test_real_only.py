@@ -22,7 +22,7 @@ OPTIONS = {
     "native": ("--native", "--platform", "linux64"),
     "FMI 3.0": ("--fmi", "3", "--platform", "linux64"),
 }
-EVERYTHING = {
+BUILDERS = {
     "python": build_cache.build_once,
     "native": native_fmus.build_native_fmus,
     "FMI 3.0": fmi3_fixtures.build_fmi3_fmus,
@@ -46,7 +46,7 @@ def folders(backend):
     """Return the folders with the FMUs that have all variables, and with those that have Reals only."""
     if backend != "python":
         native_fmus.require_compiler()
-    return EVERYTHING[backend](), build_cache.build_once(*REDUCED_MODELS, "--real-only", *OPTIONS[backend])
+    return BUILDERS[backend](), build_cache.build_once(*REDUCED_MODELS, "--real-only", *OPTIONS[backend])
 
 
 def motion(fmu, names):
@@ -61,26 +61,26 @@ def motion(fmu, names):
 
 @pytest.mark.parametrize("name", REDUCED_MODELS)
 def test_the_variables_are_reals_and_have_the_same_values(folders, backend, worker, name):
-    everything, reals = (folder / f"{name}.fmu" for folder in folders)
-    description = read_model_description(reals)
+    complete_fmu, real_fmu = (folder / f"{name}.fmu" for folder in folders)
+    description = read_model_description(real_fmu)
     assert {variable.type for variable in description.modelVariables} == {REAL[backend]}
     assert "--real-only" not in description.description
-    assert "--real-only" in read_model_description(everything).description
+    assert "--real-only" in read_model_description(complete_fmu).description
     absent = {variable for variable, meaning in declarations_of(name).items() if meaning.items}
     present = {variable.name for variable in description.modelVariables}
-    assert present == {variable.name for variable in read_model_description(everything).modelVariables} - absent
+    assert present == {variable.name for variable in read_model_description(complete_fmu).modelVariables} - absent
     names = [*outputs(name), "events.count", "solver.steps", "solver.evaluations"]
-    assert motion(worker.instantiate(reals), names) == motion(worker.instantiate(everything), names)
+    assert motion(worker.instantiate(real_fmu), names) == motion(worker.instantiate(complete_fmu), names)
 
 
 @FMI2
 def test_results_state_the_method_and_the_law_that_the_build_fixed(folders):
     """Events are those of the FMU with all variables, which the harness finds by the law."""
-    everything, reals = (simulate(folder / "coulomb.fmu") for folder in folders)
-    assert reals.settings_label == everything.settings_label == "exact, hybrid"
-    assert reals.events is not None
-    assert reals.events.t.tolist() == everything.events.t.tolist()
-    assert reals.parameters.keys() == everything.parameters.keys()
+    complete_run, real_run = (simulate(folder / "coulomb.fmu") for folder in folders)
+    assert real_run.settings_label == complete_run.settings_label == "exact, hybrid"
+    assert real_run.events is not None
+    assert real_run.events.t.tolist() == complete_run.events.t.tolist()
+    assert real_run.parameters.keys() == complete_run.parameters.keys()
 
 
 @FMI2
@@ -96,13 +96,13 @@ def test_commands_work_with_the_choices_of_the_build(folders):
 
 
 def test_a_failed_run_leaves_no_mode_that_could_be_a_result(folders, backend, worker):
-    everything, reals = (worker.instantiate(folder / "coulomb.fmu") for folder in folders)
-    for fmu in everything, reals:
+    complete_fmu, real_fmu = (worker.instantiate(folder / "coulomb.fmu") for folder in folders)
+    for fmu in complete_fmu, real_fmu:
         fmu.begin({"m": 1e-300, "F_ext": 1e308})
         with pytest.raises(Exception, match="returned status"):
             fmu.step(0.0, STEP)
-    assert everything.get("mode") == NO_VALUE
-    assert all(isnan(value) for value in (*everything.get("x", "v"), *reals.get("x", "mode", "solver.h")))
+    assert complete_fmu.get("mode") == NO_VALUE
+    assert all(isnan(value) for value in (*complete_fmu.get("x", "v"), *real_fmu.get("x", "mode", "solver.h")))
     worker.read_stderr()
 
 

@@ -34,8 +34,8 @@ def test_the_release_holds_every_kind_and_correct_checksums(build_release, tmp_p
         files = {name.removeprefix(root): archive.read(name) for name in archive.namelist()}
     kinds = {"fmus": "2.0", "fmus/native": "2.0", "fmus/native/fmi3": "3.0"}
     assert {f"{kind}/smd.fmu" for kind in kinds} | {"web/index.html", "references/smd.csv", "README.txt"} <= {*files}
-    more = {f"{kind.replace('fmus', 'fmus/more', 1)}/forced.fmu" for kind in kinds}
-    assert more | {"web/more.html", "references/forced.csv", "references/forced-events.csv"} <= {*files}
+    further_fmus = {f"{kind.replace('fmus', 'fmus/more', 1)}/forced.fmu" for kind in kinds}
+    assert further_fmus | {"web/more.html", "references/forced.csv", "references/forced-events.csv"} <= {*files}
     assert {"licenses/license.txt", "licenses/pythonfmu.txt"} <= {*files}
     for kind, version in kinds.items():
         (tmp_path / "smd.fmu").write_bytes(files[f"{kind}/smd.fmu"])

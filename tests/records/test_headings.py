@@ -52,8 +52,8 @@ def test_any_headings_give_a_record_or_a_message(tmp_path):
             assert len(read_record(path).t) == 20
 
 
-@pytest.mark.parametrize("filling", [" " * 9000, "( " * 4000, "x_" * 4000])
-def test_a_heading_of_thousands_of_characters_is_read(tmp_path, filling):
+@pytest.mark.parametrize("padding", [" " * 9000, "( " * 4000, "x_" * 4000])
+def test_a_heading_of_thousands_of_characters_is_read(tmp_path, padding):
     path = tmp_path / "record.csv"
-    path.write_text(f"t [s],x{filling}y [mm]\n" + "\n".join(f"{i / 10},{i % 7}" for i in range(20)))
+    path.write_text(f"t [s],x{padding}y [mm]\n" + "\n".join(f"{i / 10},{i % 7}" for i in range(20)))
     assert read_record(path).unit == "m"

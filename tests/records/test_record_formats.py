@@ -467,7 +467,7 @@ def test_a_selected_interval_includes_the_samples_at_both_ends():
 
 
 @pytest.mark.parametrize(
-    ("preceding", "width", "headings"),
+    ("first_rows", "width", "headings"),
     [
         ([["t", "x"]], 2, ["t", "x"]),
         ([["t", "x", "comment"]], 2, ["t", "x"]),
@@ -487,8 +487,8 @@ def test_a_selected_interval_includes_the_samples_at_both_ends():
         ([], 2, []),
     ],
 )
-def test_headings_are_the_last_rows_of_the_width_of_the_numbers(preceding, width, headings):
-    rows = [*preceding, *([f"{i + 0.5 * j}" for j in range(width)] for i in range(20))]
+def test_headings_are_the_last_rows_of_the_width_of_the_numbers(first_rows, width, headings):
+    rows = [*first_rows, *([f"{i + 0.5 * j}" for j in range(width)] for i in range(20))]
     table = parse_text_table("".join("\t".join(row) + "\n" for row in rows).encode(), "record.txt")
     assert list(table.headings) == headings
 

@@ -183,8 +183,8 @@ def test_rows_in_no_order_are_sorted_and_reported():
         rows, sentence = sort_times(t[order])
         assert (t[order][rows] == t).all()
         assert "The rows are not in the order of time" in sentence
-    touching = np.concatenate([np.linspace(5.0, 10.0, 200), np.linspace(0.0, 5.0, 200)])  # the parts share one time
-    assert (touching[sort_times(touching)[0]] == np.sort(touching)).all()
+    parts = np.concatenate([np.linspace(5.0, 10.0, 200), np.linspace(0.0, 5.0, 200)])  # which share one time
+    assert (parts[sort_times(parts)[0]] == np.sort(parts)).all()
     for times in (t, np.concatenate([t, t + 0.1]), np.concatenate([t, t])):
         rows, sentence = sort_times(times)
         assert (rows == np.arange(len(times))).all()

@@ -244,11 +244,11 @@ def test_an_input_keeps_every_sample_that_a_measured_signal_would_lose(tmp_path)
 def test_a_gap_in_an_input_is_refused(tmp_path, row, cells):
     rows = [(f"{0.01 * i:.2f}", f"{np.sin(i):.6f}", f"{np.cos(i):.6f}") for i in range(100)]
     rows[row] = cells
-    lacking = "value" if cells[0] else "time"
+    missing_item = "value" if cells[0] else "time"
     (tmp_path / "a.csv").write_text("t [s],x [m],F [N]\n" + "".join(",".join(cells) + "\n" for cells in rows))
     with pytest.raises(SceneError) as refusal:
         load_record(str(tmp_path / "a.csv"), ColumnOptions()).signals(DRIVEN_SOURCES)
-    assert f"a.csv: F, the input F, has no {lacking} in row {row + 2}: fill the gap" in str(refusal.value)
+    assert f"a.csv: F, the input F, has no {missing_item} in row {row + 2}: fill the gap" in str(refusal.value)
 
 
 @pytest.mark.parametrize("repeated_rows", [[0], [1], [77], [0, 50], [3, 4], [10, 40, 95]])

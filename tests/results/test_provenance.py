@@ -134,7 +134,7 @@ def write_decay(file):
     np.savetxt(file, rows, header="t [s],x [m]", delimiter=",", comments="")
 
 
-ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
+SWEEP_OPTIONS = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
             (("run", "fmus/smd.fmu"), ("run", "a/smd.fmu"), "smd"),
             (("decay", "coulomb", "--no-drag"), ("decay", "a/coulomb.csv", "--no-drag"), "decay/coulomb"),
             (("compare", "smd", "a/smd.fmu"), ("compare", "smd", "b/a/smd.fmu"), "compare/scene-smd-a-smd"),
-            (("sweep", "a/smd.fmu", *ONCE), ("sweep", "b/smd.fmu", *ONCE), "sweep/c"),
+            (("sweep", "a/smd.fmu", *SWEEP_OPTIONS), ("sweep", "b/smd.fmu", *SWEEP_OPTIONS), "sweep/c"),
         ],
     ),
 )
@@ -176,23 +176,23 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "older", "newer", "had"),
+    ("arguments", "older", "newer", "difference"),
     campaign_after(
         2,
         [
             (("run", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
             (("decay", "swing.csv"), (), ("--no-drag", "--end", "1.5"), "drag, no end"),
             (("compare", "fmus/coulomb.fmu", "smd"), ("--stop", "2"), (), "stop = 2.0"),
-            (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
+            (("sweep", "smd", *SWEEP_OPTIONS), ("--set", "m=2"), (), "m = 2.0 kg"),
         ],
     ),
 )
-def test_a_result_with_other_options_is_not_replaced_silently(workspace, arguments, older, newer, had):
+def test_a_result_with_other_options_is_not_replaced_silently(workspace, arguments, older, newer, difference):
     write_decay(workspace / "swing.csv")
     assert harness(workspace, *arguments, *older).returncode == 0
     result = harness(workspace, *arguments, *newer, COLUMNS="200")
     assert (result.returncode, result.stderr) == (0, "")
-    assert re.search(rf"It replaces the result of [-\dT:+]+, which had {had}\b", result.stdout)
+    assert re.search(rf"It replaces the result of [-\dT:+]+, which had {difference}\b", result.stdout)
 
 
 def test_a_result_of_another_build_of_its_fmu_is_not_replaced_silently(workspace, fmus):

@@ -502,15 +502,15 @@ def test_an_fmu_that_terminates_is_compared_up_to_its_end(harness, external_fmu_
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize("where", ["left", "right", "both"])
+@pytest.mark.parametrize("side", ["left", "right", "both"])
 @pytest.mark.parametrize("at", [1, 7, 18])
 @pytest.mark.parametrize("shift", [0.0, 0.013])
-def test_a_nonfinite_value_on_either_side_is_an_infinite_difference(value, where, at, shift):
+def test_a_nonfinite_value_on_either_side_is_an_infinite_difference(value, side, at, shift):
     """Also beside a variable that agrees, before and after it, and where times are interpolated."""
     t = np.linspace(0, 1, 20)
     good, bad = np.sin(t), np.where(np.arange(20) == at, value, np.cos(t))
-    left = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
-    right = {"a": good, "x": bad if where != "left" else np.cos(t), "z": good}
+    left = {"a": good, "x": bad if side != "right" else np.cos(t), "z": good}
+    right = {"a": good, "x": bad if side != "left" else np.cos(t), "z": good}
     units = dict.fromkeys(left, "m")
     comparison = compare(signals("one", t, left, units), signals("two", t + shift, right, units))
     assert np.isnan(comparison.worst)

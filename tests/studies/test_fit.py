@@ -348,11 +348,11 @@ def test_a_validation_record_is_averaged_only_where_its_means_are_those_of_the_o
     fit = harness.fit(native("smd"), frames[0], {"k": (100.0, 200.0)}, values={"c": 0.0}, observe="x", validate=frames)
     assert fit.records[0].width == 2
     assert [record.width for record in fit.validation.records] == [2, 1]
-    apart = harness.fit(
+    separate_fit = harness.fit(
         native("smd"), frames[0], {"k": (100.0, 200.0)}, values={"c": 0.0}, observe="x", validate=frames[1]
     )
-    assert apart.validation.columns[0].residual == pytest.approx(noise, rel=0.1)
-    assert apart.validation.remarks == ()
+    assert separate_fit.validation.columns[0].residual == pytest.approx(noise, rel=0.1)
+    assert separate_fit.validation.remarks == ()
 
 
 def test_a_driven_record_that_is_fitted_and_validated_has_one_prediction():
@@ -679,13 +679,13 @@ def test_slips_that_an_input_makes_irregular_are_described_by_the_fit_alone():
     force = np.interp(t, np.arange(0.0, 31.0, 1.5), random.uniform(-45.0, 45.0, 21))
     run = harness.simulate(native("stickslip"), times=t, inputs={"time": t, "F_ext": force})
     frame = {"t [s]": t, "F_spring [N]": run["F_spring"] + random.normal(size=len(t))}
-    without, with_input = (
+    fit_without_input, fit_with_input = (
         harness.fit(native("stickslip"), table, {"mu_s": (0.85, 0.95)}, observe="F_spring")
         for table in (frame, frame | {"F_ext [N]": force})
     )
-    assert "slips of F_spring in the record are irregular" in " ".join(without.remarks)
-    assert (with_input.slips, [text for text in with_input.remarks if "irregular" in text]) == ((), [])
-    assert with_input["mu_s"].value == pytest.approx(0.9, rel=1e-3)
+    assert "slips of F_spring in the record are irregular" in " ".join(fit_without_input.remarks)
+    assert (fit_with_input.slips, [text for text in fit_with_input.remarks if "irregular" in text]) == ((), [])
+    assert fit_with_input["mu_s"].value == pytest.approx(0.9, rel=1e-3)
 
 
 @pytest.mark.parametrize(

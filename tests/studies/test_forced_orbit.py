@@ -60,10 +60,10 @@ def test_an_oscillator_with_a_square_force_has_the_orbit_of_its_closed_form():
     c, k, period, force = 2.0, 157.9, 0.8, 10.0
     inputs = {"time": [0.0, 0.5 * period, 0.5 * period, period], "F_ext": [force, force, -force, -force]}
     (orbit,) = harness.orbit(native("smd"), {"c": c, "k": k}, inputs=inputs, period=period).motions
-    half = expm(0.5 * period * np.array([[0.0, 1.0], [-k, -c]]))
-    exact = -np.linalg.solve(np.eye(2) + half, (np.eye(2) - half) @ (force / k, 0.0))
+    transition = expm(0.5 * period * np.array([[0.0, 1.0], [-k, -c]]))
+    exact = -np.linalg.solve(np.eye(2) + transition, (np.eye(2) - transition) @ (force / k, 0.0))
     np.testing.assert_allclose(orbit.y, exact, rtol=1e-10)
-    np.testing.assert_allclose(np.prod(orbit.multipliers), np.linalg.det(half) ** 2, rtol=1e-9)
+    np.testing.assert_allclose(np.prod(orbit.multipliers), np.linalg.det(transition) ** 2, rtol=1e-9)
 
 
 @pytest.mark.campaign
@@ -113,8 +113,8 @@ def multipliers_without_stops(frequency, m=1.0, k=100.0, force=10.0, friction=6.
 
     Where it turns, a small difference of speeds is multiplied by the ratio of the accelerations after and before.
     """
-    w, largest, half = sqrt(k / m), hartog(frequency, m, k, force, friction), pi / frequency
-    c, s = np.cos(w * half), np.sin(w * half)
+    w, largest, half_period = sqrt(k / m), hartog(frequency, m, k, force, friction), pi / frequency
+    c, s = np.cos(w * half_period), np.sin(w * half_period)
     # x = p cos(frequency t) - q sin(frequency t) + friction/k + a cos(w t) + b sin(w t) from the maximum to the minimum
     rows = [1, 0, 1, 0], [0, -frequency, 0, w], [-1, 0, c, s], [0, frequency, -w * s, w * c]
     p, *_ = np.linalg.solve(rows, [largest - friction / k, 0, -largest - friction / k, 0])

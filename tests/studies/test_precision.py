@@ -56,7 +56,7 @@ def test_exact_is_within_1e_13_of_the_reference_and_1e_14_of_every_event(fmus, n
 @pytest.mark.parametrize("case", [case for case in CASES if case.name != "pacejka-0.001"], ids=lambda case: case.name)
 def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case):
     truth, model = load_reference(case.reference_source), load_model_class(fmus / f"{case.model}.fmu")
-    within = (
+    tolerance = (
         0.02 if case.reference_source == "stickslip-threshold" else 2e-3
     )  # the position of rest below eps is arbitrary
     for method in method_numbers(model):
@@ -65,7 +65,7 @@ def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case)
         ):
             continue  # seconds of explicit steps; refused
         answer = EmbeddedModel.create(model, case.run.values, method, 1e-6).solve(truth.times.tolist())
-        assert compute_errors(answer, truth).largest < within
+        assert compute_errors(answer, truth).largest < tolerance
         assert answer.evaluations > 0
 
 

@@ -210,11 +210,11 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     assert {path.name for path in (folder / "smd").iterdir()} == expected_files
     assert (folder / "pendulum/points.csv").read_text() == "older"
     texts = files["points.csv"], (folder / "smd/points.csv").read_text()
-    rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
+    rows, later_rows = (list(csv.DictReader(text.splitlines())) for text in texts)
     tools = {FMU, FMPY, *FMI3_TOOLS, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (`friction-fmus build --fmi 3`)"
-    assert [row["failure"] for row in later if row["tool"] in FMI3_TOOLS] == [unbuilt, unbuilt]
+    assert [row["failure"] for row in later_rows if row["tool"] in FMI3_TOOLS] == [unbuilt, unbuilt]
     (unrun,) = (item for item in json.loads(incomplete)["missing"] if item.startswith("Not run: "))
     assert unrun.count(unbuilt) == 1
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
@@ -225,4 +225,4 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
         [[row[name] for name in numbers] for row in item if not row["failure"]] for item in (inside, outside)
     ]
     assert finished_rows[0] == finished_rows[1]
-    assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows + later)
+    assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows + later_rows)

@@ -196,8 +196,8 @@ def test_each_contact_force_is_shaded_where_its_own_contact_sticks(blocks_run):
     run = harness.load_result(blocks_run[1])
     for contact, speed in (("F_1", run["v_1"]), ("F_2", run["v_2"] - run["v_1"])):
         for begin, end in run.sticking[contact]:
-            inside = (run.time > begin + 1e-6) & (run.time < end - 1e-6)
-            assert np.abs(speed[inside]).max(initial=0.0) < 1e-12
+            is_inside = (run.time > begin + 1e-6) & (run.time < end - 1e-6)
+            assert np.abs(speed[is_inside]).max(initial=0.0) < 1e-12
     with pytest.raises(harness.HarnessError, match=r"2 contacts \(F_1, F_2\)"):
         _ = run.events.mode
 

@@ -187,13 +187,13 @@ def test_a_refusal_needs_its_message_and_no_values(case):
     def judge_refusal(case, message, all_nan):
         return study.judge_refusal(case, SimpleNamespace(message=message, all_nan=all_nan)).ended
 
-    expecting = replace(case, max_error=None, expected_message="mu_d is")
-    assert judge_refusal(expecting, "mu_d is 1.0, above", True) == REFUSED
-    for wrong in (("", True), ("mu_d is 1.0", False), ("something else", True)):
-        assert judge_refusal(expecting, *wrong) == WRONG
+    refusal_case = replace(case, max_error=None, expected_message="mu_d is")
+    assert judge_refusal(refusal_case, "mu_d is 1.0, above", True) == REFUSED
+    for outcome in (("", True), ("mu_d is 1.0", False), ("something else", True)):
+        assert judge_refusal(refusal_case, *outcome) == WRONG
     assert judge_refusal(case, "mu_d is 1.0", True) == WRONG
     summary = SimpleNamespace(n_tried=6, failures=("m = nan was taken",))
-    assert study.judge_injections(expecting, summary).ended == WRONG
+    assert study.judge_injections(refusal_case, summary).ended == WRONG
 
 
 @pytest.mark.parametrize("wrong", [{"all_nan": False}, {"message": "a value is refused"}])

@@ -82,13 +82,13 @@ def test_too_many_runs_are_refused(sweep, n_axes):
 def test_a_reset_instance_gives_the_same_results_as_a_fresh_one(sweep):
     """Also after a failed run."""
     options = {"measures": ("final", "events", "slips", "period", "peak_speed", "stuck")}
-    together = sweep("stickslip", {"mu_d": [0.3, 0.95, 0.6], "v_driver": [0.034]}, **options)
-    assert str(together["error"].sel(mu_d=0.95).item()).startswith("mu_d is 0.95, above mu_s = 0.9")
-    alone = sweep("stickslip", {"mu_d": [0.6], "v_driver": [0.034]}, **options)
-    assert alone.equals(together.sel(mu_d=[0.6]))
+    grid_data = sweep("stickslip", {"mu_d": [0.3, 0.95, 0.6], "v_driver": [0.034]}, **options)
+    assert str(grid_data["error"].sel(mu_d=0.95).item()).startswith("mu_d is 0.95, above mu_s = 0.9")
+    single_data = sweep("stickslip", {"mu_d": [0.6], "v_driver": [0.034]}, **options)
+    assert single_data.equals(grid_data.sel(mu_d=[0.6]))
     omega, x_d = sqrt(742.5 / 12.5), 0.3 * 12.5 * 9.81 / 742.5
     peak = 0.034 + omega * sqrt(x_d**2 + (0.034 / omega) ** 2)
-    values = [alone[name].item() for name in ("events", "slips", "period", "peak_speed", "stuck")]
+    values = [single_data[name].item() for name in ("events", "slips", "period", "peak_speed", "stuck")]
     assert values == pytest.approx([8, 4, 3.34510449933, peak, 16 - 4 * 0.430665996656], rel=1e-4)
 
 
@@ -252,10 +252,10 @@ def test_one_run_that_works_is_a_sweep(sweep, workers):
     """Wherever it is among runs that fail."""
     mu_d = [0.95, 0.6, 0.96, 0.97, 0.98]  # mu_s is 0.9
     data = sweep("stickslip", {"mu_d": mu_d}, stop=2.0, measures=["events"], workers=workers)
-    alone = sweep("stickslip", {"mu_d": [0.6]}, stop=2.0, measures=["events"])
+    single_data = sweep("stickslip", {"mu_d": [0.6]}, stop=2.0, measures=["events"])
     assert [bool(error) for error in data["error"].to_numpy()] == [True, False, True, True, True]
-    assert data["events"].sel(mu_d=[0.6]).equals(alone["events"])
-    assert (data.attrs["parameters"], data.attrs["stop_time"]) == (alone.attrs["parameters"], 2.0)
+    assert data["events"].sel(mu_d=[0.6]).equals(single_data["events"])
+    assert (data.attrs["parameters"], data.attrs["stop_time"]) == (single_data.attrs["parameters"], 2.0)
     with pytest.raises(
         harness.HarnessError, match=r"^all runs of the sweep failed: 4 runs, such as mu_d = 0\.95: mu_d "
     ):

@@ -105,12 +105,12 @@ DAMAGE = {
 }
 
 
-@pytest.mark.parametrize("cut", [1, 5])
-def test_a_checkpoint_that_is_cut_off_resumes_from_its_complete_blocks(complete_data, cut):
+@pytest.mark.parametrize("n_missing", [1, 5])
+def test_a_checkpoint_that_is_cut_off_resumes_from_its_complete_blocks(complete_data, n_missing):
     """Of the last block, its line break or more is missing."""
     file, n_done = interrupt_sweep("here")
     _, last_block, _ = json.loads(file.read_text().splitlines()[-1])
-    file.write_bytes(file.read_bytes()[:-cut])
+    file.write_bytes(file.read_bytes()[:-n_missing])
     assert_resumed("here", n_done - len(last_block), complete_data)
 
 

@@ -46,8 +46,8 @@ class Crank(HybridProblem):
             y[1] = 0.0
 
 
-MORE = ("belt", "sleds", "stacked", "clutch")
-PROBLEMS = {name: event_located.PROBLEMS[name] for name in MORE} | {"lift": Lift, "crank": Crank}
+EVENT_LOCATED_NAMES = ("belt", "sleds", "stacked", "clutch")
+PROBLEMS = {name: event_located.PROBLEMS[name] for name in EVENT_LOCATED_NAMES} | {"lift": Lift, "crank": Crank}
 PROBLEMS_WITH_LAWS = PROBLEMS | {"stribeck": event_located.StribeckBelt}
 
 

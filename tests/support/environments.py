@@ -25,11 +25,11 @@ def call(*command, cwd, status=0, **environment):
 
 def required_distributions(*extras):
     """Return the distributions that the project and these of its extras require, and those that they require."""
-    distributions, waiting = {}, [(PROJECT["dependencies"], "")]
-    waiting += [(PROJECT["optional-dependencies"][extra], "") for extra in extras]
+    distributions, pending_requirements = {}, [(PROJECT["dependencies"], "")]
+    pending_requirements += [(PROJECT["optional-dependencies"][extra], "") for extra in extras]
     visited_requirements = set()
-    while waiting:
-        texts, active_extra = waiting.pop()
+    while pending_requirements:
+        texts, active_extra = pending_requirements.pop()
         for requirement in map(Requirement, texts):
             if requirement.marker and not requirement.marker.evaluate({"extra": active_extra}):
                 continue
@@ -37,7 +37,7 @@ def required_distributions(*extras):
                 if (requirement.name, extra) not in visited_requirements:
                     visited_requirements.add((requirement.name, extra))
                     distributions[requirement.name] = package = distribution(requirement.name)
-                    waiting.append((package.requires or [], extra))
+                    pending_requirements.append((package.requires or [], extra))
     return list(distributions.values())
 
 
@@ -70,7 +70,7 @@ def build_wheel(folder):
     return file
 
 
-def install(what, folder):
+def install(target, folder):
     """Install a wheel or, with -e, a folder in the environment of a folder, without network access."""
     pip = (sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--no-build-isolation")
-    call(*pip, "--ignore-installed", "--prefix", folder, *what, cwd=folder)
+    call(*pip, "--ignore-installed", "--prefix", folder, *target, cwd=folder)

@@ -82,16 +82,16 @@ def integrate_to_turning_point(pendulum, mode, t, end, theta, omega):
     def rates(_, y):
         return y[1], pendulum.acceleration(y[0], y[1], mode)
 
-    def turning(_, y):
+    def turning_speed(_, y):
         return y[1]
 
-    turning.terminal, turning.direction = True, -mode
+    turning_speed.terminal, turning_speed.direction = True, -mode
     run = solve_ivp(
         rates,
         (t, end),
         (theta, omega),
         "DOP853",
-        events=turning,
+        events=turning_speed,
         rtol=1e-13,
         atol=1e-16,
         max_step=0.01,

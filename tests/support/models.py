@@ -108,11 +108,11 @@ def experiment(name, values):
 
 def cover(groups):
     """Return a few of these cases, given with their properties, that have every property."""
-    cases, missing = [], set().union(*(properties for _, properties in groups))
-    while missing:
-        case, properties = max(groups, key=lambda group: len(group[1] & missing))
+    cases, missing_properties = [], set().union(*(properties for _, properties in groups))
+    while missing_properties:
+        case, properties = max(groups, key=lambda group: len(group[1] & missing_properties))
         cases.append(case)
-        missing -= properties
+        missing_properties -= properties
     return cases
 
 

@@ -120,9 +120,11 @@ def life_cycle(name, steps, exchange=False, references=None):
     """
     references = references or value_references(name)
     states = len(model_class(name).states) + ("x_driver" in declarations_of(name))
-    how, (x, v, *_) = f"euler {states}" if exchange else "run", outputs(name)
-    stop, read = model_class(name).stop_time, f"{references[x]} {references[v]}"
-    first, second = (f"{how} {a} {b} {steps // 2} {read}" for a, b in ((0.0, 0.5 * stop), (0.5 * stop, stop)))
+    step_command, (x, v, *_) = f"euler {states}" if exchange else "run", outputs(name)
+    stop, columns = model_class(name).stop_time, f"{references[x]} {references[v]}"
+    first, second = (
+        f"{step_command} {a} {b} {steps // 2} {columns}" for a, b in ((0.0, 0.5 * stop), (0.5 * stop, stop))
+    )
     start = ["enter", "exit", first]
     script = ["new exchange" if exchange else "new", *start, "save 1", second, "restore 1", second, "serialize 1 2"]
     script += ["deserialize 3 2", "restore 3", second, "drop 1", "drop 3", "reset", *start, second, "terminate", "free"]

@@ -114,10 +114,10 @@ def value(series, h):
 
 def sample_motion(body, pieces, times):
     """Return position, speed and last event time at each of the times, under a force that changes in pieces."""
-    rows, remaining = [], list(pieces)
+    rows, remaining_pieces = [], list(pieces)
     with localcontext(prec=DIGITS):
         for t, end in pairwise([0.0, *times]):
-            if remaining and remaining[0][0] == t:
-                body.push(*remaining.pop(0)[1:])
+            if remaining_pieces and remaining_pieces[0][0] == t:
+                body.push(*remaining_pieces.pop(0)[1:])
             rows.append([*map(float, body.go(end)), float(body.events[-1]) if body.events else 0.0])
     return rows

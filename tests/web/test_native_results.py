@@ -32,22 +32,22 @@ def test_random_parameters_and_a_change_during_the_run_match_the_native_fmu(page
     for seed in range(2):
         page.open(urlencode({".model": name, **random_values(name, seed)}))
         stop = page.run("app.state().stop")
-        when, (parameter, factor) = stop / 3, ("k" if "k" in declarations_of(name) else "m", 1.25)
+        change_time, (parameter, factor) = stop / 3, ("k" if "k" in declarations_of(name) else "m", 1.25)
         old_value = page.run(f"app.state().values[{parameter!r}]")
-        page.seek(when)
+        page.seek(change_time)
         page.check("live", True)
         page.type_number(parameter, repr(factor * old_value))
         page.check("live", False)
         (change,) = page.run("app.state().changes")
-        assert (change["t"], change["name"]) == (when, parameter)
+        assert (change["t"], change["name"]) == (change_time, parameter)
         times, columns = page.run(f"{{ {TIMES} }}"), page.run(f"{{ {COLUMNS} }}")
         assert len(times) == 1601
         fmu = worker.instantiate(native_fmus.build_native_fmus() / f"{name}.fmu")
         fmu.begin(page.run("app.state().values"), stop=stop)
         names = [v for v in outputs(name) if declarations_of(name)[v].type == "Real"]
-        rows = fmu.run_with_changes(sorted({*times, when}), names, {when: {parameter: change["value"]}})
-        at = dict(zip(sorted({*times, when}), rows, strict=True))
+        rows = fmu.run_with_changes(sorted({*times, change_time}), names, {change_time: {parameter: change["value"]}})
+        at = dict(zip(sorted({*times, change_time}), rows, strict=True))
         fmu.free()
         for actual, expected in zip(columns, zip(*(at[t] for t in times), strict=True), strict=True):
-            error = max(abs(a - b) for t, a, b in zip(times, actual, expected, strict=True) if t != when)
+            error = max(abs(a - b) for t, a, b in zip(times, actual, expected, strict=True) if t != change_time)
             assert error <= (EXACT if name in CLOSED_FORM_MODELS else STATED_TOLERANCE) * max(map(abs, expected))

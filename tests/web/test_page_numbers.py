@@ -133,8 +133,8 @@ def creeps_numbers(x_m=0.01):
         ode23(model, values, 1e-3, stop=BELT_STOP).statistics.steps
         for model, values in (("pacejka", {"x_m": x_m}), ("stickslip", {}))
     ]
-    creeping = pytest.approx(steps[0], rel=1e-3)  # sin and atan differ in the last bit between machines and the page
-    return [x_m, x - run["x"][0], t, exact.events.t[modes != 0][0], creeping, 10, 3, steps[1]]
+    step_count = pytest.approx(steps[0], rel=1e-3)  # sin and atan differ in the last bit between machines and the page
+    return [x_m, x - run["x"][0], t, exact.events.t[modes != 0][0], step_count, 10, 3, steps[1]]
 
 
 def swings_numbers():

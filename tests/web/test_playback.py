@@ -18,10 +18,10 @@ def test_a_change_during_playback_acts_from_then_on_only(page):
     assert change["name"] == "c"
     assert 0.2 < change["t"] < 4
     assert page.run("app.state().values") == {}
-    now = page.when_done("({ t: app.runs.main.time, x: app.runs.main.columns.x })")
-    before = [x for t, x in zip(now["t"], now["x"], strict=True) if t < change["t"]]
+    columns = page.when_done("({ t: app.runs.main.time, x: app.runs.main.columns.x })")
+    before = [x for t, x in zip(columns["t"], columns["x"], strict=True) if t < change["t"]]
     assert before == positions[: len(before)]
-    assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, positions[-200:]))
+    assert max(map(abs, columns["x"][-200:])) < 0.1 * max(map(abs, positions[-200:]))
     assert page.run("app.runs.unchanged.columns.x.length") == len(positions)
 
 
@@ -74,8 +74,8 @@ def test_dragging_a_moving_body_applies_a_force_until_release(page, name):
     assert {change["name"] for change in changes} == {body["input"]}
     assert any(change["value"] for change in changes)
     assert changes[-1]["value"] == 0
-    apart = "app.runs.main.columns[p].at(-1) !== app.runs.unchanged.columns[p].at(-1)"
-    assert page.run(f"(p => {apart})({body['position']!r})")
+    comparison = "app.runs.main.columns[p].at(-1) !== app.runs.unchanged.columns[p].at(-1)"
+    assert page.run(f"(p => {comparison})({body['position']!r})")
 
 
 def test_dragging_with_a_slow_method_never_goes_back_in_time(page):

@@ -97,10 +97,10 @@ def test_strings_and_numbers_are_formatted_as_in_c(library, format, types, value
 
 def test_memory_is_allocated_once_and_grows_until_exhausted(library):
     sizes = (1, 100, 70_000, 2**32 - 1, 16)
-    *places, none, last = library(f"{list(sizes)}.map((size) => c.malloc(size))")
-    assert none == 0
-    for address, size, following in zip(places, sizes, [*places[1:], last], strict=False):
-        assert (bool(address), address % 16, address + size <= following) == (True, 0, True)
+    *places, failed_address, last_address = library(f"{list(sizes)}.map((size) => c.malloc(size))")
+    assert failed_address == 0
+    for address, size, next_address in zip(places, sizes, [*places[1:], last_address], strict=False):
+        assert (bool(address), address % 16, address + size <= next_address) == (True, 0, True)
     assert library("(p => [...new Uint8Array(memory.buffer, p, 15)])(c.calloc(3, 5))") == [0] * 15
 
 
