@@ -65,9 +65,9 @@ class EventPairs:
         count = f"{len(self.one)} {events} in both"
         parts = [f"{count}, at most {self.largest_shift:.3g} s apart" if len(self.one) else count]
         for name, rows in zip(names, self.unmatched, strict=True):
-            listed = [f"{self.state(mode, contact)} at t = {t:.6g} s" for t, mode, contact in rows[:MAX_LISTED]]
+            descriptions = [f"{self.state(mode, contact)} at t = {t:.6g} s" for t, mode, contact in rows[:MAX_LISTED]]
             more = [f"{len(rows) - MAX_LISTED} more"] * (len(rows) > MAX_LISTED)
-            parts += [f"only in {name}: {', '.join(listed + more)}"] if listed else []
+            parts += [f"only in {name}: {', '.join(descriptions + more)}"] if descriptions else []
         return "; ".join(parts)
 
     def describe_first_difference(self, names: tuple[str, str]) -> str:
@@ -104,26 +104,28 @@ def stack_events(changes: ModeChanges, contacts: Sequence[str], begin: float, en
     return rows[np.argsort(rows[:, 0], kind="stable")]
 
 
-def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = (), has_slips: bool = False) -> EventPairs:
+def match_events(
+    first: np.ndarray, second: np.ndarray, contacts: Sequence[str] = (), has_slips: bool = False
+) -> EventPairs:
     """Match the events of two trajectories, (n, 3) and (m, 3), sorted by time.
 
     If both sequences of modes are equal, events are matched in order. Otherwise mutual nearest neighbours of the same
     kind (contact and new mode) are matched.
     """
     names = tuple(contacts)
-    if len(one) == len(two) and (one[:, 1:] == two[:, 1:]).all():
-        return EventPairs(one, two, (one[:0], two[:0]), names, has_slips)
+    if len(first) == len(second) and (first[:, 1:] == second[:, 1:]).all():
+        return EventPairs(first, second, (first[:0], second[:0]), names, has_slips)
     matches: list[tuple[int, int]] = []
-    for kind in np.unique(one[:, 1:], axis=0):
-        i, j = (np.flatnonzero((rows[:, 1:] == kind).all(axis=1)) for rows in (one, two))
+    for kind in np.unique(first[:, 1:], axis=0):
+        i, j = (np.flatnonzero((rows[:, 1:] == kind).all(axis=1)) for rows in (first, second))
         if not len(j):
             continue
-        in_two, in_one = find_nearest(one[i, 0], two[j, 0]), find_nearest(two[j, 0], one[i, 0])
-        mutual = np.flatnonzero(in_one[in_two] == np.arange(len(i)))
-        matches += zip(i[mutual].tolist(), j[in_two[mutual]].tolist(), strict=True)
+        in_second, in_first = find_nearest(first[i, 0], second[j, 0]), find_nearest(second[j, 0], first[i, 0])
+        mutual = np.flatnonzero(in_first[in_second] == np.arange(len(i)))
+        matches += zip(i[mutual].tolist(), j[in_second[mutual]].tolist(), strict=True)
     left, right = np.array(sorted(matches), int).reshape(-1, 2).T
-    others = np.delete(one, left, axis=0), np.delete(two, right, axis=0)
-    return EventPairs(one[left], two[right], others, names, has_slips)
+    others = np.delete(first, left, axis=0), np.delete(second, right, axis=0)
+    return EventPairs(first[left], second[right], others, names, has_slips)
 
 
 def find_nearest(times: np.ndarray, candidates: np.ndarray) -> np.ndarray:

@@ -27,13 +27,13 @@ ROUNDING = 64 * np.finfo(float).eps
 
 def draw(comparison: Comparison, figure: Figure) -> None:
     """Draw the figure; without numeric variables it is empty."""
-    selected = select_variables(comparison)
-    if not selected:
+    variables = select_variables(comparison)
+    if not variables:
         return
-    set_size(figure, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(selected))
+    set_size(figure, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(variables))
     figure.suptitle(f"{comparison.one.name} and {comparison.two.name}", fontsize=11)
-    panels = figure.subplots(len(selected), 2, sharex=True, squeeze=False)
-    for (values_axes, difference_axes), variable in zip(panels, selected, strict=True):
+    panels = figure.subplots(len(variables), 2, sharex=True, squeeze=False)
+    for (values_axes, difference_axes), variable in zip(panels, variables, strict=True):
         unit, size = display_unit(variable.unit)
         for side, style in (
             (comparison.one, {"color": BLUE}),

@@ -32,10 +32,10 @@ class ValueBounds:
 
 @dataclass(frozen=True)
 class SignalInterpolant:
-    """Interpolation of signals between its samples; the variables in `held` keep their last value."""
+    """Interpolation of signals between its samples; the variables in `held_variables` keep their last value."""
 
     signals: Signals
-    held: Set[str] = frozenset()
+    held_variables: Set[str] = frozenset()
 
     def bounds_at(self, name: str, at: np.ndarray, jumps: np.ndarray) -> ValueBounds:
         """Return the bounds of a variable at given times.
@@ -52,11 +52,11 @@ class SignalInterpolant:
         t, y = self.signals.time, self.signals.columns[name]
         index = self.sample_indices(at)
         if not np.isfinite(y).all():
-            sampled = np.where(index < 0, np.nan, y[index])  # unknown between samples
-            return ValueBounds(sampled, sampled)
+            values = np.where(index < 0, np.nan, y[index])  # unknown between samples
+            return ValueBounds(values, values)
         if (index >= 0).all():
             smooth = y[index]
-        elif name in self.held:
+        elif name in self.held_variables:
             smooth = y[np.searchsorted(t, at, "right") - 1]
         else:
             scale = REDUCTION if np.abs(y).max() > LARGE_VALUE else 1.0

@@ -46,7 +46,7 @@ def load_both(
     recordings: list[Signals | None] = [
         source if isinstance(source, Signals) else read_recorded(source) for source in sources
     ]
-    adjusted = iter(
+    adjusted_runs = iter(
         adjust(
             [
                 resolve(prefer_scene(str(source)), options)
@@ -55,7 +55,7 @@ def load_both(
             ]
         )
     )
-    runs = [None if item else next(adjusted) for item in recordings]
+    runs = [None if item else next(adjusted_runs) for item in recordings]
     grids = [grid_spacing(item.time) for item in recordings if item] + [item.grid for item in runs if item]
     grids += [fixed_grid(item) for item in runs if item]
     grid = next(filter(None, grids), None)
@@ -82,9 +82,11 @@ def display_names(sources: tuple[str, str]) -> list[str]:
     paths = [Path(abspath(source)) if Path(source).exists() else Path("scene", source) for source in sources]
     stems = [path if path.is_dir() or path.parts[0] == "scene" else path.with_suffix("") for path in paths]
     has_same_stem = stems[0] == stems[1] and paths[0] != paths[1]
-    one, two = (path.parts for path in (paths if has_same_stem else stems))
-    n_parts = next((k for k, ends in enumerate(zip(one[::-1], two[::-1], strict=False), 1) if ends[0] != ends[1]), 1)
-    return ["/".join(parts[-n_parts:]) for parts in (one, two)]
+    first, second = (path.parts for path in (paths if has_same_stem else stems))
+    n_parts = next(
+        (k for k, ends in enumerate(zip(first[::-1], second[::-1], strict=False), 1) if ends[0] != ends[1]), 1
+    )
+    return ["/".join(parts[-n_parts:]) for parts in (first, second)]
 
 
 def read_recorded(source: str) -> Signals | None:
@@ -115,11 +117,11 @@ def fixed_grid(spec: RunSpec) -> float | None:
     return communication_step(fixed_step, stop - start) if fixed_step else None
 
 
-def common_span(one: Signals, two: Signals) -> tuple[float, float]:
+def common_span(first: Signals, second: Signals) -> tuple[float, float]:
     """Return the common time span in s; HarnessError if there is none."""
-    begin, end = max(one.time[0], two.time[0]), min(one.time[-1], two.time[-1])
+    begin, end = max(first.time[0], second.time[0]), min(first.time[-1], second.time[-1])
     if not end > begin:
-        raise HarnessError(f"{one.name} and {two.name} have no time in common")
+        raise HarnessError(f"{first.name} and {second.name} have no time in common")
     return float(begin), float(end)
 
 
@@ -222,7 +224,7 @@ class Comparison:
         return next((describe_sticks(side, other) for side, other in sides if side.events and not other.events), "")
 
 
-def compare(one: Signals, two: Signals) -> Comparison:
+def compare(first: Signals, second: Signals) -> Comparison:
     """Compare the common variables over the common time span.
 
     Raises
@@ -230,16 +232,16 @@ def compare(one: Signals, two: Signals) -> Comparison:
     HarnessError
         If there are no common variables or times.
     """
-    shared = [name for name in one.columns if name in two.columns]
-    if not shared:
-        contents = [f"{side.name} ({', '.join(side.columns)})" for side in (one, two)]
+    common_names = [name for name in first.columns if name in second.columns]
+    if not common_names:
+        contents = [f"{side.name} ({', '.join(side.columns)})" for side in (first, second)]
         raise HarnessError(f"{' and '.join(contents)} have no variable in common")
-    begin, end = common_span(one, two)
-    time, interpolated = choose_times(one, two, begin, end)
-    pairs, jumps = pair_events(one, two, begin, end)
-    motions, differences, left_out = tuple(make_interpolants(one, two)), [], []
-    for name in shared:
-        unit, factor, remark = compare_units(one, two, name)
+    begin, end = common_span(first, second)
+    time, is_interpolated = choose_times(first, second, begin, end)
+    pairs, jumps = pair_events(first, second, begin, end)
+    motions, differences, left_out = tuple(make_interpolants(first, second)), [], []
+    for name in common_names:
+        unit, factor, remark = compare_units(first, second, name)
         left_out += [remark] if remark else []
         if unit is not None:
             left_bounds, right_bounds = (
@@ -248,25 +250,25 @@ def compare(one: Signals, two: Signals) -> Comparison:
             left, right = closest_values(
                 left_bounds, ValueBounds(factor * right_bounds.low, factor * right_bounds.high)
             )
-            if is_string(one, name):
+            if is_string(first, name):
                 left, right = np.zeros(len(time)), (left != right).astype(float)
             differences.append(measure_difference(name, unit, time, left, right))
     if not differences:
         raise HarnessError(f"nothing to compare: {'; '.join(left_out)}")
-    for side, other in ((one, two), (two, one)):
-        unmatched = [name for name in side.columns if name not in other.columns]
-        left_out += [f"only in {side.name}: {', '.join(unmatched)}"] if unmatched else []
-    slips = None if pairs else pair_slips(one, two, begin, end)
-    return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs, slips)
+    for side, other in ((first, second), (second, first)):
+        unmatched_names = [name for name in side.columns if name not in other.columns]
+        left_out += [f"only in {side.name}: {', '.join(unmatched_names)}"] if unmatched_names else []
+    slips = None if pairs else pair_slips(first, second, begin, end)
+    return Comparison(first, second, time, is_interpolated, tuple(differences), tuple(left_out), pairs, slips)
 
 
-def pair_slips(one: Signals, two: Signals, begin: float, end: float) -> EventPairs | None:
+def pair_slips(first: Signals, second: Signals, begin: float, end: float) -> EventPairs | None:
     """Match the starts and ends of slips between two times in s; None if a side has no moving driver or no speed.
 
     A slip lasts while the body is faster than its driver, which needs no modes.
     """
-    stacked: list[np.ndarray] = []
-    for side in (one, two):
+    events: list[np.ndarray] = []
+    for side in (first, second):
         if not {DRIVER, side.motion_outputs.get("velocity", "")} <= {*side.columns}:
             return None
         position = side.columns[DRIVER]
@@ -276,36 +278,36 @@ def pair_slips(one: Signals, two: Signals, begin: float, end: float) -> EventPai
         relative_speed = column_of_role(side, "velocity") * np.sign(driver) - abs(driver)
         starts, ends = (upward_crossings(side.time, sign * relative_speed) for sign in (1.0, -1.0))
         rows = [[t, state, 0.0] for times, state in ((starts, START), (ends, END)) for t in times if begin <= t <= end]
-        stacked.append(np.array(sorted(rows)).reshape(-1, 3))
-    left, right = stacked
+        events.append(np.array(sorted(rows)).reshape(-1, 3))
+    left, right = events
     return match_events(left, right, has_slips=True)
 
 
 def describe_sticks(side: Signals, other: Signals) -> str:
     """Return when the contacts of a side stick, where the law of the other one has no modes."""
     rests = [(name, *rest) for name, intervals in side.sticking.items() for rest in intervals]
-    listed = [
+    descriptions = [
         f"{f'{name} ' if len(side.sticking) > 1 else ''}from t = {begin:.6g} to {end:.6g} s"
         for name, begin, end in rests[:MAX_LISTED]
     ]
     more = [f"{len(rests) - MAX_LISTED} more"] * (len(rests) > MAX_LISTED)
-    text = f"{side.name} sticks {', '.join(listed + more)}" if rests else f"{side.name} never sticks"
+    text = f"{side.name} sticks {', '.join(descriptions + more)}" if rests else f"{side.name} never sticks"
     return f"{text}; {other.name} has no modes"
 
 
-def compare_units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str]:
+def compare_units(first: Signals, second: Signals, name: str) -> tuple[str | None, float, str]:
     """Return the unit of comparison (None if impossible), the factor from the second unit to it, and a remark."""
-    left, right = (side.units[name] for side in (one, two))
-    if is_string(one, name) != is_string(two, name):
-        text, number = (one, two) if is_string(one, name) else (two, one)
+    left, right = (side.units[name] for side in (first, second))
+    if is_string(first, name) != is_string(second, name):
+        text, number = (first, second) if is_string(first, name) else (second, first)
         return None, 1.0, f"{name} is a string in {text.name} and a number in {number.name}; skipped"
     if bool(left) != bool(right):
-        without_unit = (two if left else one).name
+        without_unit = (second if left else first).name
         return left or right, 1.0, f"{name} has no unit in {without_unit}; assumed {left or right}"
     factor = conversion_factor(right, left)
     if factor is None:
-        return None, 1.0, f"{name} is in {left} in {one.name} and in {right} in {two.name}; skipped"
-    return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; compared in {left}"
+        return None, 1.0, f"{name} is in {left} in {first.name} and in {right} in {second.name}; skipped"
+    return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {second.name}; compared in {left}"
 
 
 def is_string(signals: Signals, name: str) -> bool:
@@ -317,24 +319,26 @@ def is_discrete(signals: Signals, name: str) -> bool:
     return signals.columns[name].dtype.kind in "biuU"
 
 
-def make_interpolants(one: Signals, two: Signals) -> Iterator[SignalInterpolant]:
+def make_interpolants(first: Signals, second: Signals) -> Iterator[SignalInterpolant]:
     """Yield interpolants of both trajectories, with strings replaced by numbers.
 
     A variable that is discrete on one side is held on both, because many files have no types. Whole numbers alone do
     not make a variable discrete: they may be a position in whole millimetres.
     """
-    texts = [name for name in one.columns if name in two.columns and is_string(one, name) and is_string(two, name)]
-    values = {name: np.unique(np.concatenate([side.columns[name] for side in (one, two)])) for name in texts}
-    held = {name for side in (one, two) for name in side.columns if is_discrete(side, name)}
-    for side in (one, two):
+    texts = [
+        name for name in first.columns if name in second.columns and is_string(first, name) and is_string(second, name)
+    ]
+    values = {name: np.unique(np.concatenate([side.columns[name] for side in (first, second)])) for name in texts}
+    discrete_names = {name for side in (first, second) for name in side.columns if is_discrete(side, name)}
+    for side in (first, second):
         codes = {name: np.searchsorted(values[name], side.columns[name]).astype(float) for name in texts}
-        yield SignalInterpolant(replace(side, columns=side.columns | codes), held)
+        yield SignalInterpolant(replace(side, columns=side.columns | codes), discrete_names)
 
 
 def closest_values(left: ValueBounds, right: ValueBounds) -> tuple[np.ndarray, np.ndarray]:
     """Return the closest pair of values (n,) within the bounds of both sides."""
-    one = np.clip(np.maximum(left.low, right.low), left.low, left.high)
-    return one, np.clip(one, right.low, right.high)
+    left_values = np.clip(np.maximum(left.low, right.low), left.low, left.high)
+    return left_values, np.clip(left_values, right.low, right.high)
 
 
 def measure_difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: np.ndarray) -> Difference:
@@ -350,13 +354,13 @@ def measure_difference(name: str, unit: str, time: np.ndarray, left: np.ndarray,
     return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, size, left, right)
 
 
-def choose_times(one: Signals, two: Signals, begin: float, end: float) -> tuple[np.ndarray, bool]:
+def choose_times(first: Signals, second: Signals, begin: float, end: float) -> tuple[np.ndarray, bool]:
     """Return the times of comparison (n,) and whether one side is interpolated.
 
     These are the common times if there are enough of them, otherwise the times of the coarser side.
     """
     tolerance = TIME_TOLERANCE * (end - begin)
-    grids = [np.unique(side.time[(side.time >= begin) & (side.time <= end)]) for side in (one, two)]
+    grids = [np.unique(side.time[(side.time >= begin) & (side.time <= end)]) for side in (first, second)]
     coarser, finer = sorted(grids, key=len)
     at = np.clip(np.searchsorted(finer, coarser - tolerance), 0, len(finer) - 1)
     common = coarser[np.abs(finer[at] - coarser) <= tolerance]
@@ -366,23 +370,23 @@ def choose_times(one: Signals, two: Signals, begin: float, end: float) -> tuple[
 
 
 def pair_events(
-    one: Signals, two: Signals, begin: float, end: float
+    first: Signals, second: Signals, begin: float, end: float
 ) -> tuple[EventPairs | None, tuple[np.ndarray, np.ndarray]]:
     """Match the events of both sides, and return the time intervals (k, 2) in s in which each side jumps.
 
     Such an interval extends between the two times of a matched event; an unmatched event is an interval of length zero.
     """
-    mode_changes = [side.events for side in (one, two) if side.events is not None]
+    mode_changes = [side.events for side in (first, second) if side.events is not None]
     names = list(dict.fromkeys(contact for changes in mode_changes for contact in changes.modes))
     contacts = names if any(len(changes.modes) > 1 for changes in mode_changes) else []
-    first, second = (
+    first_events, second_events = (
         np.empty((0, 3)) if side.events is None else stack_events(side.events, contacts, begin, end)
-        for side in (one, two)
+        for side in (first, second)
     )
-    if one.events is None or two.events is None:
-        return None, (first[:, [0, 0]], second[:, [0, 0]])
-    pairs = match_events(first, second, contacts)
-    intervals = pairs.intervals[pairs.is_isolated(np.sort(np.concatenate([first[:, 0], second[:, 0]])))]
-    unmatched = [rows[~np.isin(rows[:, 0], intervals)][:, [0, 0]] for rows in (first, second)]
-    left, right = (np.vstack([intervals, rows]) for rows in unmatched)
+    if first.events is None or second.events is None:
+        return None, (first_events[:, [0, 0]], second_events[:, [0, 0]])
+    pairs = match_events(first_events, second_events, contacts)
+    intervals = pairs.intervals[pairs.is_isolated(np.sort(np.concatenate([first_events[:, 0], second_events[:, 0]])))]
+    unmatched_times = [rows[~np.isin(rows[:, 0], intervals)][:, [0, 0]] for rows in (first_events, second_events)]
+    left, right = (np.vstack([intervals, rows]) for rows in unmatched_times)
     return pairs, (left, right)

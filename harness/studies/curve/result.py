@@ -109,9 +109,9 @@ class CurveResult(Result, CurveIdentification):
         )
 
     def sentences(self) -> list[str]:
-        used, count = int(self.used.sum()), len(self.points.v)
+        n_used, count = int(self.used.sum()), len(self.points.v)
         fit, unit = self.best, self.points.force_unit
-        lines = [self.sentence, f"Residual of {used} of {count} points: {fit.residual:.3g} {unit}."]
+        lines = [self.sentence, f"Residual of {n_used} of {count} points: {fit.residual:.3g} {unit}."]
         for reason in dict.fromkeys(self.unavailable.values()):
             laws = [name for name, text in self.unavailable.items() if text == reason]
             lines.append(f"Not fitted: {', '.join(laws)}; {reason}.")

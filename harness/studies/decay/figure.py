@@ -74,9 +74,9 @@ def plot_energy_loss(axes: Axes, identification: DecayIdentification) -> None:
     if len(loss.amplitude):
         label = "turning points" if identification.record.order else ""
         axes.plot(*curve((loss.amplitude, loss.fraction)), "o", color="black", fillstyle="none", label=label)
-    drawn = np.concatenate([loss.fraction, loss.curves[best.terms][1]])
-    if len(drawn):
-        low, high = np.percentile(100 * drawn, [5, 95])
+    fractions = np.concatenate([loss.fraction, loss.curves[best.terms][1]])
+    if len(fractions):
+        low, high = np.percentile(100 * fractions, [5, 95])
         margin = 0.4 * (high - low) + 0.1 * abs(high) + 1e-9
         axes.set_ylim(min(low - margin, 0.0), high + margin)
     axes.set_title("energy loss per half cycle over amplitude")

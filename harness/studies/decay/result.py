@@ -60,11 +60,11 @@ class DecayResult(Result, DecayIdentification):
     def _tabulate(self) -> tuple[ResultTable, ...]:
         """Return the values to use, and below them those from the turning points and from two peaks as checks."""
         checks = [{item.name: item for item in items} for items in (self.extrema_estimates, self.two_peak_estimates)]
-        checked = [item for item in self.estimates if any(item.name in values for values in checks)]
-        one, two = checks
+        checked_estimates = [item for item in self.estimates if any(item.name in values for values in checks)]
+        from_extrema, from_peaks = checks
         columns = (
-            ResultColumn("turning points", lambda item: format_estimate(one.get(item.name))),
-            ResultColumn("two peaks (rough)", lambda item: format_estimate(two.get(item.name))),
+            ResultColumn("turning points", lambda item: format_estimate(from_extrema.get(item.name))),
+            ResultColumn("two peaks (rough)", lambda item: format_estimate(from_peaks.get(item.name))),
         )
         values = (
             ResultColumn("quantity", "{0.text}, {0.name}", is_text=True),
@@ -72,7 +72,7 @@ class DecayResult(Result, DecayIdentification):
             UNIT,
         )
         return ResultTable(self.estimates, values, self.title), ResultTable(
-            checked, (ResultColumn("check", "{0.name}", is_text=True), *columns, UNIT)
+            checked_estimates, (ResultColumn("check", "{0.name}", is_text=True), *columns, UNIT)
         )
 
     def _tabulate_details(self) -> tuple[ResultTable, ...]:

@@ -72,22 +72,22 @@ def fitted_columns(laws: Sequence[ParameterFit]) -> list[FittedColumn]:
     if validation := laws[0].validation:
         signals = [law.validation.predictions for law in laws if law.validation]
         parts.append((validation.columns, validation.records, signals, ", for validation: not fitted"))
-    fitted = []
+    drawn_columns = []
     for columns, records, predictions, text in parts:
         for n, column in enumerate(columns):
             i, j = divmod(n, predictions[0][0].shape[1])
             signals_of_laws = tuple(prediction[i][:, j] for prediction in predictions)
-            fitted.append(FittedColumn(column, records[i], j, signals_of_laws, f"{column.record}{text}"))
-    return fitted
+            drawn_columns.append(FittedColumn(column, records[i], j, signals_of_laws, f"{column.record}{text}"))
+    return drawn_columns
 
 
-def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: FittedColumn) -> None:
+def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted_column: FittedColumn) -> None:
     """Plot a column of a record with the fits, and below it the residuals of each law."""
-    plot_fits(panels[0], laws, fitted)
-    record, j = fitted.record, fitted.position
-    unit, size = display_unit(fitted.column.unit)
+    plot_fits(panels[0], laws, fitted_column)
+    record, j = fitted_column.record, fitted_column.position
+    unit, size = display_unit(fitted_column.column.unit)
     samples = record.y[:, j] / size
-    for law, signal, axes in zip(laws, fitted.signals, panels[1:], strict=True):
+    for law, signal, axes in zip(laws, fitted_column.signals, panels[1:], strict=True):
         name = f" of {law.fmu}" if len(laws) > 1 else ""
         plot_residuals(axes, record.t, samples - signal / size, float(record.noise[j]) / size, name, unit)
         axes.sharex(panels[0])
@@ -96,14 +96,14 @@ def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: Fitted
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
 
 
-def plot_fits(axes: Axes, laws: Sequence[ParameterFit], fitted: FittedColumn) -> None:
+def plot_fits(axes: Axes, laws: Sequence[ParameterFit], fitted_column: FittedColumn) -> None:
     """Plot a column of a record with the fits."""
-    unit, size = display_unit(fitted.column.unit)
-    samples = fitted.record.y[:, fitted.position] / size
-    plot_record(axes, fitted.record.t, samples, fitted.title, axis_label(fitted.column.name, unit))
-    for n, (law, signal) in enumerate(zip(laws, fitted.signals, strict=True)):
+    unit, size = display_unit(fitted_column.column.unit)
+    samples = fitted_column.record.y[:, fitted_column.position] / size
+    plot_record(axes, fitted_column.record.t, samples, fitted_column.title, axis_label(fitted_column.column.name, unit))
+    for n, (law, signal) in enumerate(zip(laws, fitted_column.signals, strict=True)):
         colour = COLOURS[n % len(COLOURS)]
-        axes.plot(fitted.record.t, signal / size, color=colour, linewidth=0.9, label=f"fit: {law.fmu}")
+        axes.plot(fitted_column.record.t, signal / size, color=colour, linewidth=0.9, label=f"fit: {law.fmu}")
     plot_legend(axes)
 
 

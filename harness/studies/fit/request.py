@@ -91,9 +91,9 @@ class FitTask:
         The scalar Reals of the FMU.
     sources : mapping
         Columns of all signals, by variable.
-    fixed : mapping
+    fixed_values : mapping
         Values of Reals that are not fitted.
-    shared : RunSpec
+    shared_run : RunSpec
         Settings that all runs of the fit share: the observed outputs, and values that are not Reals.
     notes : tuple of str
         Assumptions on which names the FMU has.
@@ -102,8 +102,8 @@ class FitTask:
     request: FitRequest
     variables: Mapping[str, RealVariable]
     sources: Mapping[str, SignalSource]
-    fixed: Mapping[str, float]
-    shared: RunSpec
+    fixed_values: Mapping[str, float]
+    shared_run: RunSpec
     notes: tuple[str, ...] = ()
 
     @property
@@ -136,7 +136,7 @@ def make_task(request: FitRequest) -> FitTask:
     check_names("observed variable", request.sigma, [*request.observe])
     check_names("free parameter", request.each, [*request.free])
     check_starts(request)
-    declared = {variable.name: variable for variable in description.modelVariables}
+    declared_variables = {variable.name: variable for variable in description.modelVariables}
     check_names("parameter", request.run.values, settable_names(description))
     for name in request.run.values:
         if name in request.free or name in request.inputs:
@@ -146,8 +146,8 @@ def make_task(request: FitRequest) -> FitTask:
     for name, value in request.sigma.items():
         if not (isfinite(value) and value > 0):
             raise SceneError(f"sigma of {name} is {value!r}: it must be a finite number above 0")
-    converted = {name: convert_value(declared[name], value) for name, value in request.run.values.items()}
-    converted = solver_settings(declared) | converted
+    values = {name: convert_value(declared_variables[name], value) for name, value in request.run.values.items()}
+    values = solver_settings(declared_variables) | values
     return FitTask(
         request,
         variables,
@@ -156,32 +156,32 @@ def make_task(request: FitRequest) -> FitTask:
             for signals, is_input in ((request.observe, False), (request.inputs, True))
             for name, heading in signals.items()
         },
-        {name: value for name, value in converted.items() if name in variables},
+        {name: value for name, value in values.items() if name in variables},
         replace(
             request.run,
             outputs=tuple(request.observe),
             follow=False,
-            values={name: value for name, value in converted.items() if name not in variables},
+            values={name: value for name, value in values.items() if name not in variables},
         ),
     )
 
 
-def solver_settings(declared: Mapping[str, Any]) -> dict[str, Any]:
+def solver_settings(variables: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tolerance of the solver, and its method if the default one is slow at this tolerance."""
-    if SOLVER_RTOL not in declared:
+    if SOLVER_RTOL not in variables:
         return {}
     settings: dict[str, Any] = {SOLVER_RTOL: TOLERANCE}
-    if SOLVER_METHOD in declared:
-        variable = declared[SOLVER_METHOD]
+    if SOLVER_METHOD in variables:
+        variable = variables[SOLVER_METHOD]
         labels = enumeration_labels(variable)
         if METHOD in labels.values() and labels.get(int(variable.start)) in SLOWER_METHODS:
             settings[SOLVER_METHOD] = convert_value(variable, METHOD)
     return settings
 
 
-def is_unknown(name: str, free: Iterable[str], each: Iterable[str]) -> bool:
+def is_unknown(name: str, free: Iterable[str], per_record: Iterable[str]) -> bool:
     """Return whether a name is that of an unknown: a free parameter, or its value in one record, as in x0[1]."""
-    return name in free or (name.endswith("]") and name.rpartition("[")[0] in each)
+    return name in free or (name.endswith("]") and name.rpartition("[")[0] in per_record)
 
 
 def check_starts(request: FitRequest) -> None:
@@ -336,22 +336,22 @@ def parse_numbers(option: str, texts: Iterable[str]) -> dict[str, float]:
     }
 
 
-def parse_starts(texts: Iterable[str], free: Iterable[str], each: Iterable[str]) -> dict[str, float]:
+def parse_starts(texts: Iterable[str], free: Iterable[str], per_record: Iterable[str]) -> dict[str, float]:
     """Return the values to start from: assignments, and the values of stored fits that are free again."""
     starts: dict[str, float] = {}
     assignments = []
     for text in texts:
         path = Path(text)
         if path.is_dir() or path.suffix == ".json":
-            starts |= select_starts(read_fitted_values(path), free, each)
+            starts |= select_starts(read_fitted_values(path), free, per_record)
         else:
             assignments.append(text)
     return starts | parse_numbers("--start", assignments)
 
 
-def select_starts(values: Mapping[str, float], free: Iterable[str], each: Iterable[str]) -> dict[str, float]:
+def select_starts(values: Mapping[str, float], free: Iterable[str], per_record: Iterable[str]) -> dict[str, float]:
     """Return those values of an earlier fit that are free again."""
-    return {name: value for name, value in values.items() if is_unknown(name, free, each)}
+    return {name: value for name, value in values.items() if is_unknown(name, free, per_record)}
 
 
 def read_fitted_values(path: Path) -> dict[str, float]:
@@ -364,8 +364,8 @@ def read_fitted_values(path: Path) -> dict[str, float]:
     """
     file = path / "fit.json" if path.is_dir() else path
     try:
-        fitted = json.loads(file.read_text(encoding="utf-8"))["fit"]
-        return {estimate["name"]: float(estimate["value"]) for estimate in fitted if estimate["value"] is not None}
+        estimates = json.loads(file.read_text(encoding="utf-8"))["fit"]
+        return {estimate["name"]: float(estimate["value"]) for estimate in estimates if estimate["value"] is not None}
     except (OSError, ValueError, KeyError, TypeError):
         raise SceneError(f"{path} holds no result of a fit: name its folder or its fit.json") from None
 
@@ -400,10 +400,10 @@ def choose_columns(request: FitRequest, records: Sequence[Record]) -> tuple[FitR
     SceneError
         If no output is named, and no column is that of an output.
     """
-    request, driven = choose_inputs(request, records)
-    request, observed = choose_observed(request, records[0])
-    request, fixed = fix_run_values(request, records)
-    return request, tuple(filter(None, (observed, driven, fixed)))
+    request, input_sentence = choose_inputs(request, records)
+    request, output_sentence = choose_observed(request, records[0])
+    request, value_sentence = fix_run_values(request, records)
+    return request, tuple(filter(None, (output_sentence, input_sentence, value_sentence)))
 
 
 def fix_run_values(request: FitRequest, records: Sequence[Record]) -> tuple[FitRequest, str]:
@@ -421,14 +421,14 @@ def fix_run_values(request: FitRequest, records: Sequence[Record]) -> tuple[FitR
         name = variable.name
         if variable.causality != "parameter" or name.startswith(SOLVER) or name in (*request.free, *request.run.values):
             continue
-        found = [*dict.fromkeys(record.parameters[name] for record in records if name in record.parameters)]
-        if len(found) > 1:
-            both = f"{found[0]} and {found[1]}"
+        record_values = [*dict.fromkeys(record.parameters[name] for record in records if name in record.parameters)]
+        if len(record_values) > 1:
+            pair = f"{record_values[0]} and {record_values[1]}"
             raise SceneError(
-                f"the runs of the records differ in {name}, {both}: free it, and name it in {option_text('each')}"
+                f"the runs of the records differ in {name}, {pair}: free it, and name it in {option_text('each')}"
             )
-        if found and found[0] != effective_value(variable, variable.start):
-            values[name] = found[0]
+        if record_values and record_values[0] != effective_value(variable, variable.start):
+            values[name] = record_values[0]
     if not values:
         return request, ""
     settings = ", ".join(f"{name} = {value}" for name, value in values.items())
@@ -454,13 +454,15 @@ def choose_inputs(request: FitRequest, records: Sequence[Record]) -> tuple[FitRe
         {column.name: column.heading for column in list_columns(record.table) if column.name in inputs}
         for record in records
     ]
-    named = {name: heading for name, heading in headings[0].items() if all(name in others for others in headings[1:])}
-    if not named:
+    input_headings = {
+        name: heading for name, heading in headings[0].items() if all(name in others for others in headings[1:])
+    }
+    if not input_headings:
         return request, ""
-    names = ", ".join(named)
-    columns = "the record has columns of these names" if len(named) > 1 else "a column has its name"
+    names = ", ".join(input_headings)
+    columns = "the record has columns of these names" if len(input_headings) > 1 else "a column has its name"
     sentence = f"the runs are driven by {names}, because {columns}; {option_text('inputs')} selects others."
-    return replace(request, inputs=named), sentence
+    return replace(request, inputs=input_headings), sentence
 
 
 def choose_observed(request: FitRequest, record: Record) -> tuple[FitRequest, str]:
@@ -482,22 +484,22 @@ def choose_observed(request: FitRequest, record: Record) -> tuple[FitRequest, st
     if options.column is not None:  # the record names its signal
         column = find_column(options.column, table, candidates)
         candidates = [replace(column, unit=options.unit or column.unit)]
-    driven = {heading.lower() for heading in request.inputs.values()}
+    input_headings = {heading.lower() for heading in request.inputs.values()}
     columns = [
         column
         for column in candidates
-        if column is not time_column and not {column.name.lower(), column.heading.lower()} & driven
+        if column is not time_column and not {column.name.lower(), column.heading.lower()} & input_headings
     ]
     description = read_description(request.run.fmu)
     outputs = {
         name: variable.unit for name, variable in real_variables(description).items() if variable.causality == "output"
     }
-    named = {column.name: column for column in columns if column.name in outputs}
-    if named:
+    output_columns = {column.name: column for column in columns if column.name in outputs}
+    if output_columns:
         roles = find_roles({variable.name: variable for variable in description.modelVariables})
-        output = next((roles[role] for role in ROLES if roles.get(role) in named), next(iter(named)))
-        others = ", ".join(name for name in named if name != output)
-        return replace(request, observe={output: named[output].heading}), (
+        output = next((roles[role] for role in ROLES if roles.get(role) in output_columns), next(iter(output_columns)))
+        others = ", ".join(name for name in output_columns if name != output)
+        return replace(request, observe={output: output_columns[output].heading}), (
             f"{output} is observed, because a column has its name{f', and {others} not' if others else ''}; "
             f"{option_text('observe')} selects other outputs."
         )

@@ -89,9 +89,9 @@ class FitResult(Result, ParameterFit):
 
     def blocks(self) -> list[ResultTable | str]:
         """Return each fit with its sentences, and the comparison with its verdict."""
-        (own, *others), comparison = self._tabulate()[:-1], self._tabulate()[-1]
-        parts: list[ResultTable | str] = [own, "", *describe_fit(self)]
-        for law, table in zip(self.against, others, strict=True):
+        (own_table, *other_tables), comparison = self._tabulate()[:-1], self._tabulate()[-1]
+        parts: list[ResultTable | str] = [own_table, "", *describe_fit(self)]
+        for law, table in zip(self.against, other_tables, strict=True):
             parts += ["", table, "", *describe_fit(law)]
         if self.comparison:
             parts += ["", comparison, ""]
@@ -149,10 +149,12 @@ def describe_residuals(column: ColumnResiduals, record: str) -> str:
 def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
     """Return a fit for JSON output."""
     comparison = {"against": [fit_as_json(law) for law in fit.against], "comparison": fit.comparison}
-    used = [UsedSamples(record.name, record.sampled_t, len(record.sampled_t), record.width) for record in fit.records]
+    samples = [
+        UsedSamples(record.name, record.sampled_t, len(record.sampled_t), record.width) for record in fit.records
+    ]
     return {
         "fmu": fit.fmu,
-        **shared_json(used, fit.columns, fit.estimates, fit.remarks),
+        **shared_json(samples, fit.columns, fit.estimates, fit.remarks),
         "notes": list(fit.notes),
         "describes_record": fit.describes_record,
         "undetermined": list(fit.undetermined),
@@ -187,14 +189,14 @@ def write_fitted_signals(
     numbers = np.concatenate([np.full(len(record.t), float(i + 1)) for i, record in enumerate(records)])
     columns = [numbers, np.concatenate([record.t for record in records])]
     for j, column in enumerate(laws[0].columns[: predictions[0][0].shape[1]]):
-        measured = np.concatenate([record.y[:, j] for record in records])
+        samples = np.concatenate([record.y[:, j] for record in records])
         headings.append(column_heading(column.name, column.unit))
-        columns.append(measured)
+        columns.append(samples)
         for law, signals in zip(laws, predictions, strict=True):
-            fitted = np.concatenate([signal[:, j] for signal in signals])
+            prediction = np.concatenate([signal[:, j] for signal in signals])
             name = "" if law is laws[0] else f" {law.fmu}"
             headings += [
                 column_heading(f"{column.name}{suffix}{name}", column.unit) for suffix in (" fit", " residual")
             ]
-            columns += [fitted, measured - fitted]
+            columns += [prediction, samples - prediction]
     write_csv(path, headings, columns)

@@ -84,11 +84,11 @@ def make_tasks(request: FitRequest, own_notes: tuple[str, ...] = ()) -> tuple[Fi
             },
             each=tuple(parameter for parameter in request.each if parameter in available),
         )
-        for kind, causalities, requested in (
+        for kind, causalities, headings in (
             ("output", READABLE, request.observe),
             ("input", ("input",), request.inputs),
         ):
-            check_names(f"{kind} of {name}", requested, variable_names(description, causalities))
+            check_names(f"{kind} of {name}", headings, variable_names(description, causalities))
         if request.free and not law.free:
             raise SceneError(
                 f"{name} has none of the free parameters {', '.join(request.free)}: free some of its own as well, as "
@@ -135,8 +135,8 @@ def load_existing(source: str, options: ColumnOptions) -> Record:
     record = load_record(source, options)
     if basename(source) != TRAJECTORY_FILE:
         return record
-    stored = load_provenance(Path(source).parent).get("parameters", {})
-    return replace(record, parameters={name: parameter["value"] for name, parameter in stored.items()})
+    parameters = load_provenance(Path(source).parent).get("parameters", {})
+    return replace(record, parameters={name: parameter["value"] for name, parameter in parameters.items()})
 
 
 def fit_laws(
@@ -182,7 +182,9 @@ def convert_outputs(fit: ParameterFit, target: ParameterFit) -> ParameterFit:
     """Return a fit with its outputs in the units of another fit to the same records."""
     columns = convert_columns(fit.columns, target.columns)
     outputs = fit.predictions[0].shape[1]
-    factors = [other.noise / own.noise for own, other in zip(fit.columns, target.columns, strict=True)][:outputs]
+    factors = [
+        target_column.noise / column.noise for column, target_column in zip(fit.columns, target.columns, strict=True)
+    ][:outputs]
     validation = fit.validation
     if validation and target.validation:
         validation = replace(
@@ -205,8 +207,8 @@ def convert_columns(
 ) -> tuple[ColumnResiduals, ...]:
     """Return the residuals of columns in the units of target columns, which have the same samples and noise."""
     return tuple(
-        replace(target, residual=own.residual * (target.noise / own.noise))
-        for own, target in zip(columns, targets, strict=True)
+        replace(target, residual=column.residual * (target.noise / column.noise))
+        for column, target in zip(columns, targets, strict=True)
     )
 
 
@@ -243,15 +245,15 @@ def fit_samples(
     slips = irregular_slips(data, [*units.items()])
     unknowns, doubts = make_unknowns(task, data), [*span_remarks(task, data)]
     with (
-        open_simulator(replace(task.shared, fmu=native_equivalent(request.run.fmu))) as simulator,
+        open_simulator(replace(task.shared_run, fmu=native_equivalent(request.run.fmu))) as simulator,
         closing(DerivativeRuns(simulator.spec)) as derivatives,
     ):
         try:
             problem, raw_fit = fit_records(
-                simulator, data, unknowns, task.fixed, request.robust, report, averages, derivatives
+                simulator, data, unknowns, task.fixed_values, request.robust, report, averages, derivatives
             )
         except HarnessError as error:
-            remarks = [*doubts, *(one.remark for one in slips)]
+            remarks = [*doubts, *(item.remark for item in slips)]
             raise HarnessError(". ".join([str(error), *remarks]).removesuffix(".")) from None
         prediction = validate(problem, raw_fit, validation) if validation else None
         notes = [note for samples in (*data, *validation) for note in samples.notes]
@@ -259,8 +261,8 @@ def fit_samples(
         fit = describe_fit(task.name, problem, raw_fit, notes, n_runs, process_time() - start_time)
     curves = read_tables_with(request.run.fmu, [estimate.name for estimate in fit.estimates], request.run.values)
     rough = {(column.record, column.name) for column in fit.columns if column.residual > ROUGH * column.noise}
-    slips = tuple(one for one in slips if (one.record, one.column) in rough)  # an input may explain the others
-    others = [*doubts, *(one.remark for one in slips)]
+    slips = tuple(item for item in slips if (item.record, item.column) in rough)  # an input may explain the others
+    others = [*doubts, *(item.remark for item in slips)]
     remarks = [*others, *fit.remarks] if fit.describes_record else [*fit.remarks, *others]
     fit = replace(fit, columns=set_units(fit.columns, units), remarks=tuple(remarks), slips=slips, tables=curves)
     if prediction:

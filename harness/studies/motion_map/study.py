@@ -26,7 +26,7 @@ from ...simulation.saved_states import SavedStateMotion
 from .result import Edge, MapResult
 
 FAILED = "run failed"
-BOTH, NEITHER = f"{STEADY} or {STICK_SLIP}", "neither"
+BISTABLE, NEITHER = f"{STEADY} or {STICK_SLIP}", "neither"
 
 BUSY = Lock()  # messages of FMUs are captured by one thread at a time
 
@@ -90,18 +90,18 @@ class MotionLabels:
         steady = self.oscillator.find_steady_sliding()
         if steady is not None and self.oscillator.is_one_body:
             sticks = self.map.sticks_again(steady)
-            return {(1, 0): STEADY, (0, 1): STICK_SLIP, (1, 1): BOTH, (0, 0): NEITHER}[steady.growth < 0.0, sticks]
-        found = {} if steady is None or steady.growth >= 0.0 else {STEADY: steady.y}
+            return {(1, 0): STEADY, (0, 1): STICK_SLIP, (1, 1): BISTABLE, (0, 0): NEITHER}[steady.growth < 0.0, sticks]
+        end_states = {} if steady is None or steady.growth >= 0.0 else {STEADY: steady.y}
         key = tuple(point.tolist())
         at = sorted([*self.ends, key]).index(key)
         neighbours = [self.ends[other] for other in sorted(self.ends.keys() - {key})[max(at - 1, 0) : at + 1]]
         starts = {name: y for ends in neighbours for name, y in ends.items()}
         for name, y in [("", self.oscillator.start), *starts.items()]:
-            end, y = self.describe_end(y, steady) if name not in found else (IRREGULAR, y)
+            end, y = self.describe_end(y, steady) if name not in end_states else (IRREGULAR, y)
             if end != IRREGULAR or not name:  # it may also be on the way to another motion
-                found.setdefault(end, y)
-        self.ends[key] = {name: y for name, y in found.items() if name != IRREGULAR}
-        return " or ".join(sorted(found))
+                end_states.setdefault(end, y)
+        self.ends[key] = {name: y for name, y in end_states.items() if name != IRREGULAR}
+        return " or ".join(sorted(end_states))
 
     def describe_end(self, y: np.ndarray, steady: SteadySliding | None) -> tuple[str, np.ndarray]:
         """Return name and states of what the motion from states y ends in."""
@@ -210,7 +210,7 @@ def search_points(labels: Labels, points: np.ndarray, axes: tuple[str, ...]) -> 
                         name, names[at] = names[at], label(end)
                         is_final &= names[at] == name
     below, above = [edge.below for edge in edges], [edge.above for edge in edges]
-    n_gaps = sum(one != other for one, other in zip([names[0], *above], [*below, names[-1]], strict=True))
+    n_gaps = sum(left != right for left, right in zip([names[0], *above], [*below, names[-1]], strict=True))
     return Line(names, edges, labels.n_runs - before, [*failures.values()], n_gaps)
 
 
@@ -276,17 +276,18 @@ def compute_map(
                 except pool.death_errors:
                     raise HarnessError(f"{spec.fmu.name}: a worker process died") from None
                 report(len(results) / len(lines))
-    ordered = [results[number] for number in range(len(lines))]
-    first_lines = ordered[: len(grid[-1]) if len(grid) > 1 else 1]  # those along the first parameter have all points
+    labelled_lines = [results[number] for number in range(len(lines))]
+    # those along the first parameter have all points
+    first_lines = labelled_lines[: len(grid[-1]) if len(grid) > 1 else 1]
     labels = tuple(label for line in first_lines for label in line.labels)
-    edges = tuple(edge for line in ordered for edge in line.edges)
+    edges = tuple(edge for line in labelled_lines for edge in line.edges)
     parameters = declared_parameters(fmu)
     settings = {name: spec.values.get(name, start) for name, (start, _) in parameters.items() if name not in names}
     units = {name: parameters[name][1] for name in names}
     options = {name: value for name in MapRequest._fields[2:] if (value := getattr(request, name))}
-    n_runs = sum(line.n_runs for line in ordered)
-    failures = tuple(failure for line in ordered for failure in line.failures)
+    n_runs = sum(line.n_runs for line in labelled_lines)
+    failures = tuple(failure for line in labelled_lines for failure in line.failures)
     if {*labels} == {FAILED}:
         raise HarnessError(f"all runs of the map failed, such as {failures[0]}")
-    n_gaps = sum(line.n_gaps for line in ordered)
+    n_gaps = sum(line.n_gaps for line in labelled_lines)
     return MapResult(spec, units, grid, labels, edges, n_gaps, n_runs, failures, settings, options)

@@ -29,12 +29,12 @@ def draw(result: "OrbitResult", figure: Figure) -> None:
 def plot_diagram(axes: Axes, result: "OrbitResult") -> None:
     """Plot the largest coordinate of all motions over the parameter; a line joins neighbouring values with orbits."""
     values = [[*group] for _, group in groupby(result.motions, lambda motion: motion.value)]
-    for one, two in pairwise([rank(motions) for motions in values] if len(values) > 1 else []):
-        for key in one.keys() & two.keys():
-            pair = one[key], two[key]
+    for lower, upper in pairwise([rank(motions) for motions in values] if len(values) > 1 else []):
+        for key in lower.keys() & upper.keys():
+            pair = lower[key], upper[key]
             axes.plot([motion.value for motion in pair], [motion.largest for motion in pair], **line_style(*key[:2]))
-    for one in map(rank, values):
-        for key, motion in one.items():
+    for ranked_motions in map(rank, values):
+        for key, motion in ranked_motions.items():
             axes.plot([motion.value], [motion.largest], ".", color=COLOURS[key[0]], markersize=2)
     for number, point in enumerate(result.points, 1):
         axes.plot([point.value], [point.largest], "o", color=GREEN, markersize=5)
@@ -48,11 +48,11 @@ def plot_diagram(axes: Axes, result: "OrbitResult") -> None:
 
 def rank(motions: list[Motion]) -> dict[tuple[str, str, int], Motion]:
     """Return motions of one value by kind, stability and their order among these."""
-    ranked: dict[tuple[str, str, int], Motion] = {}
+    ranked_motions: dict[tuple[str, str, int], Motion] = {}
     for motion in motions:
-        count = sum(key[:2] == (motion.kind, motion.stability) for key in ranked)
-        ranked[motion.kind, motion.stability, count] = motion
-    return ranked
+        count = sum(key[:2] == (motion.kind, motion.stability) for key in ranked_motions)
+        ranked_motions[motion.kind, motion.stability, count] = motion
+    return ranked_motions
 
 
 def line_style(kind: str, stability: str) -> dict[str, Any]:

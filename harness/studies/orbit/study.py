@@ -52,9 +52,9 @@ class BranchTracer:
             motions.append(self.describe_steady_sliding(steady))
         if steady is not None and self.oscillator.is_one_body:
             orbits, remarks = self.map.sliding_orbits(steady)
-            stuck = self.map.turn_after_stick(steady) if self.map.sticks_again(steady) else None
-            if stuck is not None or steady.growth < 0.0:  # a motion that sticks forgets its start
-                seeds = [] if stuck is None else [stuck[1].y]
+            turn = self.map.turn_after_stick(steady) if self.map.sticks_again(steady) else None
+            if turn is not None or steady.growth < 0.0:  # a motion that sticks forgets its start
+                seeds = [] if turn is None else [turn[1].y]
         for seed in seeds:
             end = self.map.run_long(seed)
             if end.kind == REST:
@@ -106,12 +106,12 @@ class BranchTracer:
 
     # ---- special points between two values
 
-    def locate(self, one: list[Motion], two: list[Motion]) -> list[SpecialPoint]:
+    def locate(self, lower: list[Motion], upper: list[Motion]) -> list[SpecialPoint]:
         """Return the special points between the motions at two neighbouring values."""
-        low, high = one[0].value, two[0].value
-        steady = [next((motion for motion in motions if motion.kind == STEADY), None) for motions in (one, two)]
-        sticks = [any(motion.kind == STICK_SLIP for motion in motions) for motions in (one, two)]
-        sliding = [[motion for motion in motions if motion.kind == SLIDING_ORBIT] for motions in (one, two)]
+        low, high = lower[0].value, upper[0].value
+        steady = [next((motion for motion in motions if motion.kind == STEADY), None) for motions in (lower, upper)]
+        sticks = [any(motion.kind == STICK_SLIP for motion in motions) for motions in (lower, upper)]
+        sliding = [[motion for motion in motions if motion.kind == SLIDING_ORBIT] for motions in (lower, upper)]
         points = []
         if steady[0] and steady[1]:
             if (steady[0].growth < 0.0) != (steady[1].growth < 0.0):
@@ -171,26 +171,28 @@ class BranchTracer:
         value = value_of(best.x)
         return SpecialPoint(value, "fold: two orbits meet", x + best.x, "extreme value along the branch")
 
-    def follow(self, one: list[Motion], two: list[Motion], value: float, change: str) -> list[SpecialPoint]:
+    def follow(self, motions: list[Motion], targets: list[Motion], value: float, change: str) -> list[SpecialPoint]:
         """Follow motions to another value, where they are added to those with other names, or up to a special point.
 
         Around steady sliding of one body all motions are known.
         """
-        points, names = list[SpecialPoint](), {motion.name for motion in two}
-        for motion in one if not (self.oscillator.is_one_body and any(item.kind == STEADY for item in two)) else ():
+        points, names = list[SpecialPoint](), {motion.name for motion in targets}
+        for motion in (
+            motions if not (self.oscillator.is_one_body and any(item.kind == STEADY for item in targets)) else ()
+        ):
             if motion.kind != STEADY and motion.name not in names:
-                tracked, n_remarks = TrackedMotion(self, motion), len(self.remarks)
+                tracked_motion, n_remarks = TrackedMotion(self, motion), len(self.remarks)
                 end, is_found = motion.value, True
                 for _ in range(MAX_RESTARTS):  # found from nearby, where it was not found from far away
                     if end == value or not is_found:
                         break
-                    ((edge, end, *_),) = find_edges(tracked.move_to, end, value, True, False)
-                    is_found = tracked.move_to(end)
+                    ((edge, end, *_),) = find_edges(tracked_motion.move_to, end, value, True, False)
+                    is_found = tracked_motion.move_to(end)
                 if end == value and is_found:
-                    two.append(tracked.motion)
+                    targets.append(tracked_motion.motion)
                 else:
                     how = "bisection on whether it is found"
-                    points.append(SpecialPoint(edge, f"{motion.name} {change}", tracked.motion.largest, how))
+                    points.append(SpecialPoint(edge, f"{motion.name} {change}", tracked_motion.motion.largest, how))
                 del self.remarks[n_remarks:]  # on values between these two
         return points
 
@@ -217,25 +219,29 @@ class TrackedMotion:
 
 def join_changes(points: list[SpecialPoint]) -> list[SpecialPoint]:
     """Return the points in order, with the end of one motion where another one begins as one point."""
-    joined = list[SpecialPoint]()
+    joined_points = list[SpecialPoint]()
     for point in sorted(points, key=lambda point: (point.value, point.kind)):
-        last = joined[-1] if joined else point
+        last = joined_points[-1] if joined_points else point
         kinds = sorted((last.kind, point.kind), key=lambda kind: kind.endswith(BEGINS))
         is_near = abs(point.value - last.value) <= NEAR * abs(point.value)
         if is_near and kinds[0].endswith(ENDS) and kinds[1].endswith(BEGINS):
-            joined[-1] = replace(
+            joined_points[-1] = replace(
                 last, kind=f"{kinds[0].removesuffix(f' {ENDS}')} become {kinds[1].removesuffix(f' {BEGINS}')}"
             )
         else:
-            joined.append(point)
-    return joined
+            joined_points.append(point)
+    return joined_points
 
 
-def is_same(one: Motion, two: Motion) -> bool:
+def is_same(motion: Motion, other: Motion) -> bool:
     """Return whether two motions are the same."""
-    size = max(abs(one.largest), abs(one.smallest))
-    near = abs(one.largest - two.largest) <= NEAR * size and abs(one.smallest - two.smallest) <= NEAR * size
-    return one.kind == two.kind and near and (one.kind == AT_REST or abs(one.period - two.period) <= NEAR * one.period)
+    size = max(abs(motion.largest), abs(motion.smallest))
+    near = abs(motion.largest - other.largest) <= NEAR * size and abs(motion.smallest - other.smallest) <= NEAR * size
+    return (
+        motion.kind == other.kind
+        and near
+        and (motion.kind == AT_REST or abs(motion.period - other.period) <= NEAR * motion.period)
+    )
 
 
 def describe_irregular(closest: float) -> str:
@@ -289,15 +295,15 @@ def compute_orbits(
             report(0.8 * (number + 1) / max(1, len(values)))
         for number in reversed(range(len(motions) - 1)):
             points += tracer.follow(motions[number + 1], motions[number], values[number], BEGINS)
-        for number, (one, two) in enumerate(pairwise(motions), 1):
+        for number, (lower, upper) in enumerate(pairwise(motions), 1):
             try:
-                points += tracer.locate(one, two) if one and two else []
+                points += tracer.locate(lower, upper) if lower and upper else []
             except NoOrbitError as error:
                 name = tracer.name_value(values[number])
                 tracer.remarks.append(f"a special point below {name} is not located: {error}.")
             report(0.8 + 0.2 * number / len(values))
         points = join_changes(points)
-        every = tuple(motion for found in motions for motion in sorted(found, key=lambda motion: motion.amplitude))
+        every = tuple(motion for group in motions for motion in sorted(group, key=lambda motion: motion.amplitude))
         coordinate = oscillator.states[oscillator.coordinate]
         options = {"over": {parameter: [*values]} if parameter else None, "section": section, "period": period}
         return OrbitResult(

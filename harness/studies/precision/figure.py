@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Solver = tuple[str, str]  # tool and method
 
 COSTS = {"seconds": "run time [s]", "evaluations": "right-hand side and Jacobian evaluations"}
-LABELLED: tuple[dict[str, Any], ...] = (  # styles of the labelled solvers, in their order
+STYLES: tuple[dict[str, Any], ...] = (  # styles of the labelled solvers, in their order
     {"color": BLUE, "linestyle": "-", "marker": "o"},
     {"color": ORANGE, "linestyle": "-", "marker": "s"},
     {"color": GREEN, "linestyle": "--", "marker": "^"},
@@ -76,12 +76,12 @@ def choose_labelled(study: "PrecisionResult", case: "PrecisionCase") -> list[Sol
     solvers = [solver for solver in study.solvers(case) if solver[0] not in (FMPY, CS, ME)]
     errors = {solver: min((p.largest for p in study.curve(case, *solver)), default=np.inf) for solver in solvers}
     rest = sorted(solvers, key=lambda solver: errors[solver])
-    return list(dict.fromkeys([*own_solvers[:2], *peers[:1], *ranks, *rest]))[: len(LABELLED)]
+    return list(dict.fromkeys([*own_solvers[:2], *peers[:1], *ranks, *rest]))[: len(STYLES)]
 
 
 def plot_curves(axes: Axes, study: "PrecisionResult", case: "PrecisionCase", cost: str) -> None:
     """Plot every solver of a case, log-log; failed runs are gaps."""
-    labelled = choose_labelled(study, case)
+    labelled_solvers = choose_labelled(study, case)
     for tool, method in study.solvers(case):
         is_duplicate = tool in (FMPY, CS) and (
             cost != "seconds" or case.is_chattering
@@ -91,8 +91,8 @@ def plot_curves(axes: Axes, study: "PrecisionResult", case: "PrecisionCase", cos
         points = [p for p in study.points if (p.case, p.tool, p.method) == (case.name, tool, method)]
         errors = [max(p.error(case.is_chattering), FLOOR) for p in points]
         costs = [np.nan if p.failure else getattr(p, cost) for p in points]
-        if (tool, method) in labelled:
-            style = LABELLED[labelled.index((tool, method))] | {"label": f"{tool}: {method}", "markersize": 5}
+        if (tool, method) in labelled_solvers:
+            style = STYLES[labelled_solvers.index((tool, method))] | {"label": f"{tool}: {method}", "markersize": 5}
         else:
             style = OTHER | {"label": "_other"}
         axes.loglog(errors, costs, **style)
@@ -107,6 +107,6 @@ def mark_error(axes: Axes, error: float, text: str) -> None:
 
 def add_legend(axes: Axes) -> None:
     """Add a legend of the labelled solvers above a panel, fastest first."""
-    order = [style["color"] for style in LABELLED]
+    order = [style["color"] for style in STYLES]
     lines = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
     axes.legend(handles=sorted(lines, key=lambda line: order.index(line.get_color())), ncols=3, **LEGEND_ABOVE)

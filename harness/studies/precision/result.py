@@ -207,8 +207,8 @@ class PrecisionResult(Result):
             columns += [ResultColumn(f"{format_power(target)}: ms", partial(format_cost, self, target, "seconds"))]
             columns += [ResultColumn("calls", partial(format_cost, self, target, "evaluations"))]
         title = f"{self.model}: run time and right-hand side calls for a given largest error"
-        measured = [solver for solver in solvers if self.curve(*solver)]
-        work = ResultTable(measured, columns, title, group=lambda solver: (solver[0].law,))
+        measured_solvers = [solver for solver in solvers if self.curve(*solver)]
+        work = ResultTable(measured_solvers, columns, title, group=lambda solver: (solver[0].law,))
         return work, self.exchange_table(), ResultTable(self.deviations, DEVIATIONS, LAWS_TABLE, UNITS)
 
     def exchange_table(self) -> ResultTable:

@@ -115,19 +115,21 @@ def measure_precision(model: str, settings: SweepSettings, report: Callable[[flo
     for index, (case, job) in enumerate(tasks):
         points += sweep_tolerances(case, job, settings)
         report((index + 1) / len(tasks))
-    measured = tuple(PrecisionCase(case.name, case.law, dict(case.run.values), case.is_chattering) for case in cases)
+    measured_cases = tuple(
+        PrecisionCase(case.name, case.law, dict(case.run.values), case.is_chattering) for case in cases
+    )
     deviations = [compare_with_dry_friction(case, model_class) for case in cases if case.dry_friction_reference]
     if model == "stickslip":
         deviations += [compare_bristles(name, law, load_more_model(name)) for name, law in BRISTLES.items()]
     notes = describe_failures(file.stem, points)
-    return PrecisionResult(file.stem, measured, tuple(points), tuple(deviations), settings.min_ratio, notes)
+    return PrecisionResult(file.stem, measured_cases, tuple(points), tuple(deviations), settings.min_ratio, notes)
 
 
 def describe_failures(model: str, points: Sequence[Point]) -> tuple[str, ...]:
     """Return sentences on the runs that failed, that were not built, and on solvers that are not installed."""
     runs = [point for point in points if not (point.failure and isnan(point.rtol))]
-    failed = sum(bool(point.failure) for point in runs)
-    counts = [f"{model}: {failed} of {len(runs)} runs failed; see {model}/points.csv"] * bool(failed)
+    n_failed = sum(bool(point.failure) for point in runs)
+    counts = [f"{model}: {n_failed} of {len(runs)} runs failed; see {model}/points.csv"] * bool(n_failed)
     reasons = [*dict.fromkeys(point.failure for point in points if point.failure and isnan(point.rtol))]
     if missing := missing_packages():
         names = ", ".join(f"{package} ({peer})" for peer, package in missing.items())
@@ -193,12 +195,12 @@ class CaseRunner:
         recording = run_own_fmu(spec, limit_run_time(settings.timeout, stop))
         assert recording.statistics  # FMUs of this project report it
         repeat = repeats(recording.statistics.seconds, settings.budget)
-        timed = run_own_fmu(replace(spec, repeat=repeat)).statistics
-        assert timed
+        statistics = run_own_fmu(replace(spec, repeat=repeat)).statistics
+        assert statistics
         events = find_changes(recording, *modes) if modes else None
         motion, evaluations = sample_at(recording, self.times, states), recording.statistics.evaluations
         solution = Solution(self.times, motion, events, evaluations)
-        return solution, min(timed.seconds, recording.statistics.seconds)
+        return solution, min(statistics.seconds, recording.statistics.seconds)
 
     def run_peer(self, peer: str, method: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
         """Run a peer solver."""

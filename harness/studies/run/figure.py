@@ -51,16 +51,16 @@ TITLE_PAD = 20  # in points: padding of a title above a legend
 
 @dataclass(frozen=True)
 class PlottedRun:
-    """A run with enough points for smooth curves, the `results` of its analyses, and the `known` values."""
+    """A run with enough points for smooth curves, the `results` of its analyses, and the `known_values`."""
 
     run: Trajectory
     results: dict[str, Any]
-    known: KnownValues | None
+    known_values: KnownValues | None
 
     @property
     def kind(self) -> str:
         """Return the kind of the known values, for labels."""
-        return self.known.kind if self.known else ""
+        return self.known_values.kind if self.known_values else ""
 
     def unit(self, name: str) -> tuple[str, float]:
         """Return the display unit of an output and its size in the unit of the output."""
@@ -73,8 +73,8 @@ class PlottedRun:
 
     def known_value(self, name: str) -> float | None:
         """Return a known value in SI units, or None."""
-        known = self.known.values.get(name) if self.known else None
-        value, unit = known if isinstance(known, tuple) else (known, "")
+        entry = self.known_values.values.get(name) if self.known_values else None
+        value, unit = entry if isinstance(entry, tuple) else (entry, "")
         return value * PUBLISHED_UNITS.get(unit, ("", 1.0))[1] if isinstance(value, int | float) else None
 
 
@@ -86,7 +86,7 @@ def draw(run: "RunResult", title: str, plots: Iterable[str], figure: Figure) -> 
     if tables := read_model_data(run.spec.fmu).tables:
         right = columns.pop() if is_right(columns[-1][0], run) else []
         columns.append([*right, *tables])
-    plotted = PlottedRun(refine(run), run._analyses, run._known)
+    plotted_run = PlottedRun(refine(run), run._analyses, run._known_values)
     # with several contacts, each column over time ends with a panel of all contacts
     below = [len(run.contacts) * CONTACT_HEIGHT + 0.2] if len(run.contacts) > 1 else []
     ratios = [
@@ -104,9 +104,9 @@ def draw(run: "RunResult", title: str, plots: Iterable[str], figure: Figure) -> 
             if isinstance(name, LookupTable):
                 draw_table(axes, name, name.y_with(run.parameters), BLUE)
                 continue
-            PANELS.get(name if is_panel(name, run.columns) else "", plot_output)(axes, plotted, name)
+            PANELS.get(name if is_panel(name, run.columns) else "", plot_output)(axes, plotted_run, name)
         if len(heights) > len(names):
-            plot_sticking(grid[-1], plotted)
+            plot_sticking(grid[-1], plotted_run)
 
 
 def is_right(panel: str | LookupTable, run: Trajectory) -> bool:
@@ -148,18 +148,18 @@ def refine(run: Trajectory) -> Trajectory:
     return replace(run, time=time, columns=columns)
 
 
-def plot_output(axes: Axes, plotted: PlottedRun, name: str) -> None:
+def plot_output(axes: Axes, plotted_run: PlottedRun, name: str) -> None:
     """Plot an output, or the output with a role, over time."""
-    run = plotted.run
+    run = plotted_run.run
     role = name if is_panel(name, run.columns) else ""
     name = run.motion_outputs.get(role, name)
-    values, (unit, size) = plotted.values(name), plotted.unit(name)
+    values, (unit, size) = plotted_run.values(name), plotted_run.unit(name)
     style = "steps-post" if values.dtype.kind in "iu" else "default"
     axes.plot(run.time, values, color=BLUE, drawstyle=style)
     mark_modes(axes, run, contact_of(run, name))
-    level = plotted.known_value(PEAK_LEVELS.get(role, ""))
+    level = plotted_run.known_value(PEAK_LEVELS.get(role, ""))
     if level is not None:
-        axes.axhline(level / size, color=GREEN, linestyle=":", label=f"{plotted.kind} peak")
+        axes.axhline(level / size, color=GREEN, linestyle=":", label=f"{plotted_run.kind} peak")
     axes.set_title(run.descriptions[name])
     add_legend(axes)
     axes.set_ylabel(axis_label(name, unit))
@@ -183,39 +183,39 @@ def mark_modes(axes: Axes, run: Trajectory, contact: str) -> None:
         axes.plot(t, y, color=GREY, linewidth=0.5, linestyle=":", label="reversal", transform=transform)
 
 
-def plot_sticking(axes: Axes, plotted: PlottedRun) -> None:
+def plot_sticking(axes: Axes, plotted_run: PlottedRun) -> None:
     """Plot a row for each contact that shows when it sticks."""
-    draw_sticking(axes, plotted.run, GREY)
+    draw_sticking(axes, plotted_run.run, GREY)
     axes.set_title("sticking of each contact")
     axes.set_xlabel("t [s]")
-    axes.set_xlim(*LIMITS @ plotted.run.time[[0, -1]])
+    axes.set_xlim(*LIMITS @ plotted_run.run.time[[0, -1]])
     axes.label_outer()
 
 
-def plot_position(axes: Axes, plotted: PlottedRun, name: str) -> None:
+def plot_position(axes: Axes, plotted_run: PlottedRun, name: str) -> None:
     """Plot position over time, with driver position and turning points if available."""
-    run, results = plotted.run, plotted.results
+    run, results = plotted_run.run, plotted_run.results
     if "x_driver" in run.columns:
         axes.plot(run.time, run.columns["x_driver"], color=ORANGE, linestyle="--", label="x_driver")
     if "decay" in results:
         decay = results["decay"]
-        _, size = plotted.unit(run.motion_outputs["position"])
+        _, size = plotted_run.unit(run.motion_outputs["position"])
         axes.plot(decay.times, decay.positions / size, "o", color=ORANGE, fillstyle="none", label="turning points")
-        for known, index in KNOWN_PEAKS.items():
-            peak = plotted.known_value(known)
+        for peak_name, index in KNOWN_PEAKS.items():
+            peak = plotted_run.known_value(peak_name)
             if peak is not None:
-                signed = np.copysign(peak / size, decay.positions[index])
-                axes.plot(decay.times[index], signed, "+", color=GREEN, markersize=11, label=plotted.kind)
-        value = plotted.known_value(decay.result.name)
+                position = np.copysign(peak / size, decay.positions[index])
+                axes.plot(decay.times[index], position, "+", color=GREEN, markersize=11, label=plotted_run.kind)
+        value = plotted_run.known_value(decay.result.name)
         if value is not None:
             top = envelope(decay, value) / size
             for side in (top, -top):
-                axes.plot(decay.times, side, color=GREEN, linestyle=":", label=plotted.kind)
-    first, period = plotted.known_value("first_slip"), plotted.known_value("period")
+                axes.plot(decay.times, side, color=GREEN, linestyle=":", label=plotted_run.kind)
+    first, period = plotted_run.known_value("first_slip"), plotted_run.known_value("period")
     if first is not None and period is not None:
         for at in np.arange(first, run.time[-1], period):
-            axes.axvline(at, color=GREEN, linestyle=":", label=f"{plotted.kind} slip")
-    plot_output(axes, plotted, name)
+            axes.axvline(at, color=GREEN, linestyle=":", label=f"{plotted_run.kind} slip")
+    plot_output(axes, plotted_run, name)
 
 
 def envelope(decay: Any, value: float) -> np.ndarray:
@@ -229,9 +229,9 @@ def envelope(decay: Any, value: float) -> np.ndarray:
 def add_legend(axes: Axes) -> None:
     """Put a legend above the panel, without the labels that the legend of a panel before it has."""
     legends = filter(None, (panel.get_legend() for panel in axes.figure.figure.axes if panel is not axes))
-    shown = {text.get_text() for legend in legends for text in legend.get_texts()}
+    shown_labels = {text.get_text() for legend in legends for text in legend.get_texts()}
     handles, labels = axes.get_legend_handles_labels()
-    entries = {label: handle for label, handle in zip(labels, handles, strict=True) if label not in shown}
+    entries = {label: handle for label, handle in zip(labels, handles, strict=True) if label not in shown_labels}
     if entries:
         axes.legend(entries.values(), entries, **LEGEND_ABOVE, ncols=len(entries))
         title = axes.get_title(loc="left")
@@ -239,28 +239,28 @@ def add_legend(axes: Axes) -> None:
             axes.set_title(title, pad=TITLE_PAD)
 
 
-def plot_phase_plane(axes: Axes, plotted: PlottedRun, name: str) -> None:
+def plot_phase_plane(axes: Axes, plotted_run: PlottedRun, name: str) -> None:
     """Plot velocity over position in a square, in which a free oscillation is a circle."""
-    motion = plotted.run.motion_outputs
+    motion = plotted_run.run.motion_outputs
     x, v = motion["position"], motion["velocity"]
-    axes.plot(plotted.values(x), plotted.values(v), color=BLUE)
+    axes.plot(plotted_run.values(x), plotted_run.values(v), color=BLUE)
     axes.set_title("phase plane")
     axes.set_box_aspect(1)
     axes.set_anchor("N")
     axes.locator_params(axis="x", nbins=5)
-    axes.set_xlabel(axis_label(x, plotted.unit(x)[0]))
-    axes.set_ylabel(axis_label(v, plotted.unit(v)[0]))
+    axes.set_xlabel(axis_label(x, plotted_run.unit(x)[0]))
+    axes.set_ylabel(axis_label(v, plotted_run.unit(v)[0]))
 
 
-def plot_steps(axes: Axes, plotted: PlottedRun, name: str) -> None:
+def plot_steps(axes: Axes, plotted_run: PlottedRun, name: str) -> None:
     """Plot the internal step sizes over the start times of the steps, with their mean if it was measured."""
-    run = plotted.run
+    run = plotted_run.run
     assert run.steps is not None  # ensured by check_steps()
     axes.semilogy(run.steps.t[:-1], run.steps.h, color=BLUE, linewidth=0.6, marker=".", markersize=3)
-    if "steps" in plotted.results:
+    if "steps" in plotted_run.results:
         means = {
             "mean": (published_mean_step(run.steps.h), ORANGE, "--"),
-            plotted.kind: (plotted.known_value("mean_step"), GREEN, ":"),
+            plotted_run.kind: (plotted_run.known_value("mean_step"), GREEN, ":"),
         }
         for word, (mean, color, style) in means.items():
             if mean is not None:

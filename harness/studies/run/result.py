@@ -68,32 +68,34 @@ class RunResult(Trajectory, Result):
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """The measured quantities: those of the analyses, and run time and evaluations."""
-        measured = tuple(quantity for result in self._analyses.values() for quantity in result.quantities)
-        measured += self.statistics.quantities if self.statistics else ()
+        quantities = tuple(quantity for result in self._analyses.values() for quantity in result.quantities)
+        quantities += self.statistics.quantities if self.statistics else ()
         if self.scene and not self.failure:
-            check_known_values(self.scene, self, measured)
-        return measured
+            check_known_values(self.scene, self, quantities)
+        return quantities
 
     @property
-    def _known(self) -> KnownValues | None:
+    def _known_values(self) -> KnownValues | None:
         """The values that the quantities are compared with."""
         return self.scene.known if self.scene else None
 
     @property
     def outcome(self) -> Outcome | None:
         """The largest difference from a known value; steps of a law that chatters are not judged."""
-        if not (self._known and self._analyses):
+        if not (self._known_values and self._analyses):
             return None
-        ignored = STEP_QUANTITIES if chatters(self) else ()
-        differences = [(deviation(item, self._known.values.get(item.name)), item) for item in self.quantities]
+        ignored_names = STEP_QUANTITIES if chatters(self) else ()
+        differences = [(deviation(item, self._known_values.values.get(item.name)), item) for item in self.quantities]
         deviations = [
-            (percent, item.text) for percent, item in differences if percent is not None and item.name not in ignored
+            (percent, item.text)
+            for percent, item in differences
+            if percent is not None and item.name not in ignored_names
         ]
         if not deviations:
             return None
         percent, name = max(deviations, key=lambda pair: abs(pair[0]))
         text, is_good = f"{name} differs by {percent:+.2g} %", abs(percent) <= MAX_DEVIATION
-        return Outcome(f"{percent:+.2g} %", text, is_good, percent, self._known.kind, self._known.source)
+        return Outcome(f"{percent:+.2g} %", text, is_good, percent, self._known_values.kind, self._known_values.source)
 
     @property
     def _caption(self) -> str:
@@ -148,10 +150,12 @@ class RunResult(Trajectory, Result):
         if self.scene and not self.failure:
             sentences = (*filter(None, [self.scene.about]), *self.sentences())
         if self._analyses:
-            compared = [item for item in self.quantities if self._known and item.name in self._known.values]
-            others = [item for item in self.quantities if item not in compared]
-            main, rest = (compared, others) if compared else (others, compared)
-            columns = quantity_columns(self._known)
+            compared_quantities = [
+                item for item in self.quantities if self._known_values and item.name in self._known_values.values
+            ]
+            others = [item for item in self.quantities if item not in compared_quantities]
+            main, rest = (compared_quantities, others) if compared_quantities else (others, compared_quantities)
+            columns = quantity_columns(self._known_values)
             other_table = ResultTable([(self, item) for item in rest], columns[:3], OTHER_QUANTITIES)
             tables = (ResultTable([(self, item) for item in main], columns), other_table, *self._step_table())
         return replace(
@@ -168,30 +172,34 @@ class RunResult(Trajectory, Result):
                 "comparison": comparison,
             }
         spans = {name: dict(zip(SPAN, span_of(column), strict=True)) for name, column in self.columns.items()}
-        stuck = {name: {"changes": changes, "stuck": duration} for name, changes, duration in list_rests(self)}
+        contacts = {name: {"changes": changes, "stuck": duration} for name, changes, duration in list_rests(self)}
         return {
             "fmu": self.name,
             "note": describe_accuracy(self),
             "failed": self.failure,
             "final": {name: span["end"] for name, span in spans.items()},
             "outputs": {name: {"unit": self.units[name]} | span for name, span in spans.items()},
-            **({"contacts": stuck} if self.events else {}),
+            **({"contacts": contacts} if self.events else {}),
         }
 
     def _comparison_as_json(self) -> dict[str, Any] | None:
         """Return the known values with their kind, source, citation and differences; None without any."""
-        if self._known is None:
+        if self._known_values is None:
             return None
-        known, outcome = self._known, self.outcome
-        compared = [quantity for quantity in self.quantities if quantity.name in known.values]
+        known_values, outcome = self._known_values, self.outcome
+        compared_quantities = [quantity for quantity in self.quantities if quantity.name in known_values.values]
         values = [
-            {"name": item.name, "value": known.values[item.name], "percent": deviation(item, known.values[item.name])}
-            for item in compared
+            {
+                "name": item.name,
+                "value": known_values.values[item.name],
+                "percent": deviation(item, known_values.values[item.name]),
+            }
+            for item in compared_quantities
         ]
         return {
-            "kind": known.kind,
-            "source": known.source,
-            "citation": known.citation,
+            "kind": known_values.kind,
+            "source": known_values.source,
+            "citation": known_values.citation,
             "values": values,
             "agrees": outcome.is_good if outcome else None,
             "text": outcome.text if outcome else "",
@@ -218,7 +226,7 @@ class RunResult(Trajectory, Result):
             columns = [self.events.t, *self.events.modes.values()]
             write_csv(folder / "events.csv", ["t [s]", *self.events.headings], columns)
         if self._analyses:
-            table = ResultTable([(self, item) for item in self.quantities], quantity_columns(self._known, ""))
+            table = ResultTable([(self, item) for item in self.quantities], quantity_columns(self._known_values, ""))
             write_csv_rows(folder / "quantities.csv", table.headings, table.rows())
 
     @property
@@ -289,8 +297,8 @@ def check_known_values(scene: Scene, run: Trajectory, quantities: tuple[Quantity
         try:
             quantities_by_name[name].to_unit(unit)
         except KeyError:
-            measured = quantities_by_name[name].unit
-            raise SceneError(f"{name} in '{unit}' is incompatible with the measured unit '{measured}'") from None
+            measured_unit = quantities_by_name[name].unit
+            raise SceneError(f"{name} in '{unit}' is incompatible with the measured unit '{measured_unit}'") from None
         is_set = name in run.parameters and (run.parameters[name], run.units[name]) == (number, unit)
         if kind == "parameter" and not is_set:
             raise SceneError(
@@ -325,41 +333,43 @@ def tabulate_quantities(runs: Iterable[RunResult], everything: bool) -> ResultTa
         (run, quantity)
         for run in runs
         for quantity in run.quantities
-        if everything or quantity.name in ALWAYS_SHOWN or (run._known and quantity.name in run._known.values)
+        if everything
+        or quantity.name in ALWAYS_SHOWN
+        or (run._known_values and quantity.name in run._known_values.values)
     ]
-    known = next((run._known for run, _ in rows if run._known), None)
-    columns = quantity_columns(known)
-    if known:
+    known_values = next((run._known_values for run, _ in rows if run._known_values), None)
+    columns = quantity_columns(known_values)
+    if known_values:
         columns = (*columns[:3], replace(columns[3], heading="compared with"), columns[4])
-    note = OTHER_MACHINE if known and any(columns[4].cell(row) == "other CPU" for row in rows) else ""
+    note = OTHER_MACHINE if known_values and any(columns[4].cell(row) == "other CPU" for row in rows) else ""
     return ResultTable(rows, columns, group=describe_run, note=note, padding=0)
 
 
 def describe_run(row: tuple[RunResult, Quantity]) -> tuple[str, ...]:
     """Return the name and the settings of a run, and the origin of its known values, above its quantities."""
-    run, known = row[0], row[0]._known
-    origin = ("", "", f"{known.kind}\n{known.source}") if known else ()
+    run, known_values = row[0], row[0]._known_values
+    origin = ("", "", f"{known_values.kind}\n{known_values.source}") if known_values else ()
     return (f"{run.title}\n  {run.settings_label}", *origin)
 
 
-def quantity_columns(known: KnownValues | None, heading: str = "quantity") -> tuple[ResultColumn, ...]:
+def quantity_columns(known_values: KnownValues | None, heading: str = "quantity") -> tuple[ResultColumn, ...]:
     """Return the columns of pairs of a run and a quantity, with those of known values if there are any."""
     columns = (
         ResultColumn(heading, "{0[1].text}", is_text=True),
         ResultColumn("measured", lambda row: quantity_cells(row)[0]),
         ResultColumn("unit", lambda row: quantity_cells(row)[1], is_text=True),
     )
-    if known is None:
+    if known_values is None:
         return columns
-    compared = ResultColumn(known.label, lambda row: quantity_cells(row)[2])
-    return (*columns, compared, ResultColumn("difference", lambda row: quantity_cells(row)[3]))
+    known_column = ResultColumn(known_values.label, lambda row: quantity_cells(row)[2])
+    return (*columns, known_column, ResultColumn("difference", lambda row: quantity_cells(row)[3]))
 
 
 def quantity_cells(row: tuple[RunResult, Quantity]) -> tuple[str, str, str, str]:
     """Return measured value, unit, known value and difference, in the unit of the known value."""
     run, quantity = row
     known_value, value, unit = (
-        run._known.values.get(quantity.name) if run._known else None,
+        run._known_values.values.get(quantity.name) if run._known_values else None,
         quantity.value,
         quantity.unit,
     )
@@ -367,13 +377,18 @@ def quantity_cells(row: tuple[RunResult, Quantity]) -> tuple[str, str, str, str]
         known_value, unit = known_value
         value = quantity.to_unit(unit)
     if not isinstance(known_value, int | float):
-        measured, unit = quantity.format()
-        return measured, unit, str(known_value or ""), ""
-    known = repr(known_value)
-    measured = format_number(value, max(5, len(known.replace(".", "").lstrip("0"))))
+        measured_text, unit = quantity.format()
+        return measured_text, unit, str(known_value or ""), ""
+    known_text = repr(known_value)
+    measured_text = format_number(value, max(5, len(known_text.replace(".", "").lstrip("0"))))
     percent = deviation(quantity, (known_value, unit))
     difference = "" if percent is None else f"{percent:+.2g} %"
-    return measured, "" if unit == "1" else unit, known, "other CPU" if quantity.name == "run_time" else difference
+    return (
+        measured_text,
+        "" if unit == "1" else unit,
+        known_text,
+        "other CPU" if quantity.name == "run_time" else difference,
+    )
 
 
 def deviation(quantity: Quantity, known_value: object) -> float | None:
@@ -391,19 +406,23 @@ def chatters(run: Trajectory) -> bool:
 
 def explain_chatter(runs: Iterable[RunResult]) -> str:
     """Return why the known steps of scenes whose friction chatters are not judged; empty without any."""
-    names = [run.title for run in runs if run._known and chatters(run) and {*STEP_QUANTITIES} & {*run._known.values}]
+    names = [
+        run.title
+        for run in runs
+        if run._known_values and chatters(run) and {*STEP_QUANTITIES} & {*run._known_values.values}
+    ]
     reason = "friction chatters at a stop, so they depend on rounding"
     return f"Steps of {', '.join(names)} are not judged: {reason}." if names else ""
 
 
 def conclude(runs: Iterable[RunResult]) -> tuple[str, bool]:
     """Return what was checked, with the cases that differ from their known values, and whether all agree."""
-    judged = [(run.title, outcome) for run in runs if (outcome := run.outcome)]
-    counts = {kind: sum(outcome.kind == kind for _, outcome in judged) for kind in KINDS}
+    outcomes = [(run.title, outcome) for run in runs if (outcome := run.outcome)]
+    counts = {kind: sum(outcome.kind == kind for _, outcome in outcomes) for kind in KINDS}
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
-    differing = [f"{name}: {outcome.text}" for name, outcome in judged if not outcome.is_good]
-    text = f"{len(judged) - len(differing)} of {len(judged)} cases agree within {MAX_DEVIATION:g} % ({kinds})."
-    return "\n".join((text, *differing)) if judged else "", not differing
+    differing = [f"{name}: {outcome.text}" for name, outcome in outcomes if not outcome.is_good]
+    text = f"{len(outcomes) - len(differing)} of {len(outcomes)} cases agree within {MAX_DEVIATION:g} % ({kinds})."
+    return "\n".join((text, *differing)) if outcomes else "", not differing
 
 
 def span_of(column: np.ndarray) -> list[Any]:

@@ -49,8 +49,8 @@ class SensitivityEvent:
     @property
     def text(self) -> str:
         """Return the contacts that change, with their modes before and after the event."""
-        changed = [name for name, mode in self.after.items() if mode != self.before[name]]
-        return ", ".join(f"{name} {self.before[name]} to {self.after[name]}" for name in changed) or self.contact
+        contacts = [name for name, mode in self.after.items() if mode != self.before[name]]
+        return ", ".join(f"{name} {self.before[name]} to {self.after[name]}" for name in contacts) or self.contact
 
 
 @dataclass(frozen=True, repr=False)

@@ -65,15 +65,15 @@ def compute_sensitivity(
     tolerance = spec.tolerance or DEFAULT_RTOL
     run = replace(spec, outputs=outputs, values=values, times=times, start=start, stop=stop, tolerance=tolerance)
     solution = run_isolated(run, tuple(parameters), is_own(description), report)
-    driven = [name for name in parameters if name in spec.inputs]
+    input_names = [name for name in parameters if name in spec.inputs]
     effective = {name: float(values.get(name, variables[name].start or 0.0)) for name in parameters}
     units = {name: variable_unit(variables[name]) for name in (*outputs, *parameters)}
     return SensitivityResult(
         replace(source, outputs=outputs, times=(), start=start, stop=stop),
         times,
         outputs,
-        effective | dict.fromkeys(driven, 1.0),
-        units | dict.fromkeys(driven, ""),
+        effective | dict.fromkeys(input_names, 1.0),
+        units | dict.fromkeys(input_names, ""),
         solution.values,
         solution.left,
         solution.right,
@@ -92,11 +92,11 @@ def choose_outputs(description: Any, parameters: Sequence[str], outputs: Sequenc
     states = [state.name for state in state_variables(description)]
     reals = [item for item in description.modelVariables if item.type in REAL_TYPES and not item.dimensions]
     starts = {item.name for item in reals if item.name in states and item.initial == "exact"}
-    known = {item.name for item in reals if item.causality in ("parameter", "input") and item.name != TIME}
-    check_names("parameter", parameters, known | starts)
-    declared = [item.name for item in reals if item.causality == "output"]
-    check_names("output", outputs, [*declared, *(name for name in states if name not in declared)])
-    return tuple(outputs or declared)
+    settable_names = {item.name for item in reals if item.causality in ("parameter", "input") and item.name != TIME}
+    check_names("parameter", parameters, settable_names | starts)
+    output_names = [item.name for item in reals if item.causality == "output"]
+    check_names("output", outputs, [*output_names, *(name for name in states if name not in output_names)])
+    return tuple(outputs or output_names)
 
 
 def run_isolated(
@@ -147,8 +147,8 @@ def name_indicator(contacts: Sequence[str], indicator: int) -> str:
 
 def describe_exceptions(fmu: Path, solution: VariationalSolution, parameters: Sequence[str]) -> tuple[str, ...]:
     """Return sentences on parameters without an effect, and on times without derivatives."""
-    unused = [name for name, is_used in zip(parameters, solution.is_used, strict=True) if not is_used]
-    remarks = [f"Nothing depends on {', '.join(unused)}: all derivatives are zero."] if unused else []
+    unused_names = [name for name, is_used in zip(parameters, solution.is_used, strict=True) if not is_used]
+    remarks = [f"Nothing depends on {', '.join(unused_names)}: all derivatives are zero."] if unused_names else []
     contacts = list(read_model_data(fmu).contacts)
     for item in solution.undefined_derivatives:
         where, names = "at" if item.is_moment else "from", ", ".join(item.parameters)

@@ -169,14 +169,14 @@ class StabilityResult(Result):
     def _tabulate(self) -> tuple[ResultTable, ...]:
         """Return the errors and steps of runs that should finish, and the messages of those that should be refused."""
         finishing: dict[tuple[str, str], dict[str, CaseOutcome]] = {}
-        numbers, refused = dict[str, float](), dict[str, list[CaseOutcome]]()
+        numbers, refusals = dict[str, float](), dict[str, list[CaseOutcome]]()
         for row in sorted(self.outcomes, key=lambda row: row.case.name):
             if row.case.max_error is not None:
                 finishing.setdefault((row.case.name, row.case.title), {})[row.case.method] = row
                 numbers[row.case.method] = row.case.run.values["solver.method"]
         for row in self.outcomes:
             if row.case.max_error is None:
-                refused.setdefault(row.case.title, []).append(row)
+                refusals.setdefault(row.case.title, []).append(row)
         columns = [ResultColumn("scene", lambda item: item[0][1], is_text=True)]
         columns += [
             ResultColumn(name, partial(format_outcome, name))
@@ -184,21 +184,21 @@ class StabilityResult(Result):
         ]
         title = "largest relative error, and internal steps below"
         errors = ResultTable([*finishing.items()], columns, title, group=lambda item: (item[0][0],))
-        return errors, ResultTable([*refused.values()], REFUSALS, "refused with a message")
+        return errors, ResultTable([*refusals.values()], REFUSALS, "refused with a message")
 
     def _tabulate_details(self) -> tuple[ResultTable, ...]:
         """Return the cases that failed, and the number of outcomes by model and method."""
-        failed = [row for row in self.outcomes if row.ended == WRONG]
+        failed_outcomes = [row for row in self.outcomes if row.ended == WRONG]
         pairs: dict[tuple[str, str], Counter[str]] = {}
         for row in self.outcomes:
             pairs.setdefault((row.case.name, row.case.method), Counter())[row.ended] += 1
         endings = sorted({ending for counts in pairs.values() for ending in counts})
         columns = [ResultColumn("model", "{0[0][0]}", is_text=True), ResultColumn("method", "{0[0][1]}", is_text=True)]
         columns += [ResultColumn("failed" if name == WRONG else name, f"{{0[1][{name}]}}") for name in endings]
-        counted = ResultTable(
+        count_table = ResultTable(
             sorted(pairs.items(), key=lambda item: item[0]), columns, "Number of outcomes by model and method"
         )
-        return ResultTable(failed, FAILURES, "Cases that failed"), counted
+        return ResultTable(failed_outcomes, FAILURES, "Cases that failed"), count_table
 
     def summary(self) -> Summary:
         """Return the findings, with the cases that failed first."""

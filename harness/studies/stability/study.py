@@ -120,9 +120,9 @@ def generic_scenes(model: str, info: FmuInfo, has_comparable_events: bool) -> li
     parameters = {
         n: x for n, x in info.start_values.items() if x and n not in info.enumerations and not n.startswith("solver.")
     }
-    generated: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
-    generated += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
-    generated += [
+    scenes: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
+    scenes += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
+    scenes += [
         {"title": f"{name} = {share * value:g}", "values": {name: share * value}}
         for name, value in parameters.items()
         for share in (0.1, 10.0)
@@ -133,7 +133,7 @@ def generic_scenes(model: str, info: FmuInfo, has_comparable_events: bool) -> li
         "methods": ["default"],
     }
     bounds = {"exact": 1e-6, "other": LOOSE}
-    return [{**common, "pattern": scene["title"], "finish": bounds, **scene} for scene in [*generated, injections]]
+    return [{**common, "pattern": scene["title"], "finish": bounds, **scene} for scene in [*scenes, injections]]
 
 
 def expand_scene(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -52,7 +52,7 @@ class Checkpoint:
     """
 
     def __init__(self, path: Path, runs: int, columns: int) -> None:
-        self.path, self.shape, self.damaged = path, (runs, columns), False
+        self.path, self.shape, self.is_damaged = path, (runs, columns), False
         self.clear()
 
     def clear(self) -> None:
@@ -108,7 +108,7 @@ class Checkpoint:
             for line in complete:
                 self.store(*json.loads(line))
         except (ValueError, TypeError, AttributeError, RecursionError):
-            self.damaged = True
+            self.is_damaged = True
             self.clear()
             complete = []
         self.file.truncate(sum(map(len, complete)))
@@ -232,7 +232,7 @@ def completed_blocks(
     first, values, messages : int, numpy.ndarray, dict
         Number of the first run of a finished block, its values (runs, columns), and error messages by index.
     """
-    pending, repeated, running = spans[::-1], set[int](), dict[Future[BlockResult], Span]()
+    pending, repeated_runs, running = spans[::-1], set[int](), dict[Future[BlockResult], Span]()
     size, deaths = 1, 0
     while pending or running:
         check_interrupt()
@@ -253,10 +253,10 @@ def completed_blocks(
                 if end > first + 1:
                     middle = (first + end) // 2
                     pending += [(first, middle), (middle, end)]
-                elif first in repeated:
+                elif first in repeated_runs:
                     yield first, np.full((1, sweep.columns), np.nan), {0: WORKER_DIED}
                 else:
-                    repeated.add(first)
+                    repeated_runs.add(first)
                     pending.append((first, end))
             except HarnessError:
                 raise

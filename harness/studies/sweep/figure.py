@@ -37,29 +37,29 @@ def thin_out(dataset: xarray.Dataset) -> xarray.Dataset:
     return thin.where(is_drawable)
 
 
-def draw(data: xarray.Dataset, figure: Figure, failed: int) -> None:
+def draw(data: xarray.Dataset, figure: Figure, n_failed: int) -> None:
     """Draw the figure: panels of the measures, over each parameter in scatter plots, and one of each varied table.
 
     Without runs, the figure stays empty.
     """
     if not all(data.sizes.values()):
         return
-    measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
-    scattered, tables = is_scattered(data), tables_of(data)
+    measures, parameters = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
+    is_scatter, tables = is_scattered(data), tables_of(data)
     draw_panel: list[Callable[[Axes], None]]
-    if scattered:
-        n_columns = len(varied)
+    if is_scatter:
+        n_columns = len(parameters)
         draw_panel = [
-            partial(plot_scatter, data=data, measure=measure, name=name) for measure in measures for name in varied
+            partial(plot_scatter, data=data, measure=measure, name=name) for measure in measures for name in parameters
         ]
     else:
         n_columns = 1 if len(measures) == 1 and not tables else 2
         draw_panel = [partial(draw_measure, data=data, measure=measure) for measure in measures]
     draw_panel += [partial(draw_curves, data=data, table=table) for table in tables]
     n_rows = -(-len(draw_panel) // n_columns)
-    height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
+    height = HEIGHT * (1.2 if is_scatter or len(parameters) == 1 else 1.7)
     set_size(figure, max(1.2, n_columns) * WIDTH, height * n_rows + 0.6)
-    figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
+    figure.suptitle(f"{data.attrs['title']}{f' ({n_failed} runs failed)' if n_failed else ''}", fontsize=11)
     panels = figure.subplots(n_rows, n_columns, squeeze=False).flat
     for axes, draw_on in zip(panels, draw_panel, strict=False):
         draw_on(axes)
@@ -84,15 +84,15 @@ def draw_curves(axes: Axes, data: xarray.Dataset, table: LookupTable) -> None:
     combinations = np.unique(
         np.column_stack(columns if "run" in data.dims else [grid.ravel() for grid in np.meshgrid(*columns)]), axis=0
     )
-    chosen = np.unique(np.linspace(0, len(combinations) - 1, MAX_CURVES).round().astype(int))
-    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.9, len(chosen)))
-    for n, colour in zip(chosen, colours, strict=True):
+    indices = np.unique(np.linspace(0, len(combinations) - 1, MAX_CURVES).round().astype(int))
+    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.9, len(indices)))
+    for n, colour in zip(indices, colours, strict=True):
         label = None
         if len(names) == 1 and n in (0, len(combinations) - 1):
             label = f"{table.name} with {names[0]} = {combinations[n, 0]:g} {data[names[0]].attrs['units']}"
         draw_table(axes, table, table.y_with(dict(zip(names, combinations[n], strict=True))), colour, label)
-    if len(chosen) < len(combinations):
-        axes.set_title(f"table {table.name}: {len(chosen)} of {len(combinations)} curves")
+    if len(indices) < len(combinations):
+        axes.set_title(f"table {table.name}: {len(indices)} of {len(combinations)} curves")
 
 
 def is_scattered(data: xarray.Dataset) -> bool:

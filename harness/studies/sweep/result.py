@@ -96,8 +96,8 @@ class SweepResult(Result):
         result.folder = folder = Path(folder)
         library = import_optional("xarray", "to read a sweep", "sweep")
         try:
-            with library.open_dataset(folder / DATASET_FILE, engine="scipy") as stored:
-                result.dataset = stored.load()
+            with library.open_dataset(folder / DATASET_FILE, engine="scipy") as dataset:
+                result.dataset = dataset.load()
         except (OSError, ValueError) as error:
             raise SceneError(f"{folder / DATASET_FILE} cannot be read: {first_line(error)}") from None
         return result
@@ -130,8 +130,8 @@ class SweepResult(Result):
         try:
             return self.data[name]
         except (AttributeError, IndexError, KeyError, TypeError, ValueError):
-            known = map(str, self.data.variables)
-            raise SceneError(unknown_name_message("measure or parameter", name, known)) from None
+            names = map(str, self.data.variables)
+            raise SceneError(unknown_name_message("measure or parameter", name, names)) from None
 
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and name in self.data

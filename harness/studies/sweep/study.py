@@ -50,7 +50,7 @@ class SweepDescription:
 
     Attributes
     ----------
-    varied : dict
+    varied_parameters : dict
         Unit and description of each varied parameter.
     columns : tuple of MeasureColumn
         Measured columns.
@@ -58,14 +58,14 @@ class SweepDescription:
         Lookup tables with varied values; the others are those of the runs.
     """
 
-    varied: dict[str, tuple[str, str]]
+    varied_parameters: dict[str, tuple[str, str]]
     columns: tuple[MeasureColumn, ...]
     tables: tuple[LookupTable, ...] = ()
 
     @property
     def headings(self) -> list[str]:
         """Return the headings of the varied parameters and of the columns, with units."""
-        units = {name: unit for name, (unit, _) in self.varied.items()}
+        units = {name: unit for name, (unit, _) in self.varied_parameters.items()}
         units |= {column.name: column.unit for column in self.columns}
         return [column_heading(name, "" if unit == "1" else unit) for name, unit in units.items()]
 
@@ -114,7 +114,7 @@ def run_sweep(
             len(points),
             new_folder,
             n_resumed,
-            checkpoint.damaged,
+            checkpoint.is_damaged,
             failures,
             seconds,
             ", ".join(about.headings),
@@ -142,8 +142,10 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
     texts = {
         name: f"{variables[name].description or name}{describe_labels(variables[name])}" for name in runs.varied_names
     }
-    varied = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
-    return SweepDescription(varied, columns, read_tables_with(runs.run.fmu, runs.varied_names, runs.run.values))
+    varied_parameters = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
+    return SweepDescription(
+        varied_parameters, columns, read_tables_with(runs.run.fmu, runs.varied_names, runs.run.values)
+    )
 
 
 def read_constants(sweep: Sweep, messages: dict[int, str]) -> tuple[dict[str, tuple[object, str]], float]:
@@ -179,7 +181,7 @@ def build_dataset(
     shape = tuple(len(axis.values) for axis in points.axes) if is_grid else (len(points),)
     coordinates = {}
     for i, axis in enumerate(points.axes):
-        unit, text = about.varied[axis.name]
+        unit, text = about.varied_parameters[axis.name]
         attributes = {"units": unit or "1", "long_name": text, "scale": "log" if axis.log else "linear"}
         values = np.array(axis.values) if is_grid else points.sample[:, i]
         coordinates[axis.name] = (axis.name if is_grid else "run", values, attributes)
