@@ -21,9 +21,9 @@ if sys.orig_argv[1:3] == ["-m", "harness"] or "".join(sys.orig_argv[1:2]).endswi
             signal.signal(number, exit_early)
 
 if sys.argv[:1] == ["-m"]:  # python -m harness: no file of the working folder, such as a model math.py, is imported
-    HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    if sys.path[0] != HERE:
-        sys.path += [HERE, sys.path.pop(0)]
+    PARENT_FOLDER = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    if sys.path[0] != PARENT_FOLDER:
+        sys.path += [PARENT_FOLDER, sys.path.pop(0)]
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -87,19 +87,19 @@ def check_arguments(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        declared = signature(function)
-        assert set(rules) <= set(declared.parameters), f"{function.__name__} has no argument of a rule"
-        optional = {name for name, parameter in declared.parameters.items() if parameter.default is None}
+        function_signature = signature(function)
+        assert set(rules) <= set(function_signature.parameters), f"{function.__name__} has no argument of a rule"
+        optional = {name for name, parameter in function_signature.parameters.items() if parameter.default is None}
 
         @wraps(function)
-        def checked(*arguments: P.args, **options: P.kwargs) -> R:
-            call = declared.bind(*arguments, **options)
+        def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
+            call = function_signature.bind(*arguments, **options)
             for name, value in call.arguments.items():
                 if name in rules and not (value is None and name in optional):
                     call.arguments[name] = rules[name].check(name, value)
             return function(*call.args, **call.kwargs)
 
-        return checked
+        return wrapper
 
     return decorate
 
@@ -138,7 +138,7 @@ def at_least_zero(value: Any) -> float:
     return number
 
 
-def whole(low: int, high: float = inf) -> Rule:
+def whole_number(low: int, high: float = inf) -> Rule:
     """Return the rule of a whole number from `low` to `high`."""
 
     def convert(value: Any) -> int:
@@ -153,14 +153,14 @@ def whole(low: int, high: float = inf) -> Rule:
 
 def choice(category: str, names: Iterable[str]) -> Rule:
     """Return the rule of one of several names."""
-    allowed = tuple(names)
+    allowed_names = tuple(names)
 
     def convert(value: Any) -> str:
-        if not isinstance(value, str) or value not in allowed:
-            raise UnknownNameError(unknown_name_message(category, value, allowed))
+        if not isinstance(value, str) or value not in allowed_names:
+            raise UnknownNameError(unknown_name_message(category, value, allowed_names))
         return value
 
-    return Rule(f"one of {', '.join(allowed)}", convert)
+    return Rule(f"one of {', '.join(allowed_names)}", convert)
 
 
 def flag(value: Any) -> bool:
@@ -341,8 +341,8 @@ def axes(value: Any) -> Any:
 FINITE = Rule("a finite number", real, float)
 POSITIVE = Rule("a finite number above 0", above_zero, float, "x>0")
 NONNEGATIVE = Rule("a finite number of at least 0", at_least_zero, float, "x>=0")
-COUNT, NATURAL = whole(1), whole(0)
-WORKERS, RUNS = whole(1, MAX_WORKERS), whole(1, MAX_RUNS)
+COUNT, NATURAL = whole_number(1), whole_number(0)
+WORKERS, RUNS = whole_number(1, MAX_WORKERS), whole_number(1, MAX_RUNS)
 FLAG = Rule("true or false", flag)
 TEXT = Rule("a text that is not empty", text)
 NAMES = Rule("a name, or a list of names", names)

@@ -50,7 +50,7 @@ def format_value(value: object) -> str:
     return text if len(text) <= MAX_VALUE_LENGTH else f"{text[:MAX_VALUE_LENGTH]}... ({len(text)} characters)"
 
 
-def unknown_name_message(category: str, name: object, allowed: Iterable[str]) -> str:
+def unknown_name_message(category: str, name: object, allowed_names: Iterable[str]) -> str:
     """Return the message about a name that is not allowed, with the nearest allowed name.
 
     Parameters
@@ -59,48 +59,54 @@ def unknown_name_message(category: str, name: object, allowed: Iterable[str]) ->
         Category of the name, as in "output" or "scene".
     name : object
         The invalid name.
-    allowed : iterable of str
+    allowed_names : iterable of str
         The valid names.
     """
-    allowed_names, quoted = sorted(allowed), format_value(name)
-    close = get_close_matches(quoted.strip("'"), allowed_names, n=1)
+    sorted_names, quoted_name = sorted(allowed_names), format_value(name)
+    close = get_close_matches(quoted_name.strip("'"), sorted_names, n=1)
     hint = f" (nearest: '{close[0]}')" if close else ""
-    more = f" and {len(allowed_names) - MAX_LISTED_NAMES} more" if len(allowed_names) > MAX_LISTED_NAMES else ""
-    return f"unknown {category} {quoted}{hint}; allowed: {', '.join(allowed_names[:MAX_LISTED_NAMES]) or 'none'}{more}"
+    more = f" and {len(sorted_names) - MAX_LISTED_NAMES} more" if len(sorted_names) > MAX_LISTED_NAMES else ""
+    return (
+        f"unknown {category} {quoted_name}{hint}; allowed: {', '.join(sorted_names[:MAX_LISTED_NAMES]) or 'none'}{more}"
+    )
 
 
-def unknown_source_message(category: str, source: str, allowed: Iterable[str], other: str = "") -> str:
+def unknown_source_message(category: str, source: str, allowed_names: Iterable[str], other: str = "") -> str:
     """Return the message about a source that is not an allowed name, and about a path that does not exist.
 
     Parameters
     ----------
-    category, allowed
+    category, allowed_names
         As in `unknown_name_message`.
     source : str
         The invalid name or path.
     other : str
         Other allowed sources, as in ", or the path of a .toml file".
     """
-    message = unknown_name_message(category, source, allowed) + other
+    message = unknown_name_message(category, source, allowed_names) + other
     if exists(source):
         return message
     is_path = bool(splitext(source)[1]) or basename(source) != source
-    quoted = format_value(source)
-    return f"{quoted} does not exist; {message}" if is_path else f"{message}; no file or folder {quoted} exists"
+    quoted_source = format_value(source)
+    return (
+        f"{quoted_source} does not exist; {message}"
+        if is_path
+        else f"{message}; no file or folder {quoted_source} exists"
+    )
 
 
-def check_names(category: str, names: Iterable[object], allowed: Collection[str]) -> None:
+def check_names(category: str, names: Iterable[object], allowed_names: Collection[str]) -> None:
     """Raise SceneError for the first name that is not allowed, or no text."""
     for name in names:
-        if not isinstance(name, str) or name not in allowed:
-            raise SceneError(unknown_name_message(category, name, allowed))
+        if not isinstance(name, str) or name not in allowed_names:
+            raise SceneError(unknown_name_message(category, name, allowed_names))
 
 
-def check_varied(category: str, varied: Iterable[str], allowed: Collection[str], values: Collection[str]) -> None:
+def check_varied(category: str, names: Iterable[str], allowed_names: Collection[str], values: Collection[str]) -> None:
     """Raise SceneError for a varied variable that is not allowed, or is also among the set values."""
-    varied = [*varied]
-    check_names(category, varied, allowed)
-    for name in varied:
+    names = [*names]
+    check_names(category, names, allowed_names)
+    for name in names:
         if name in values:
             raise SceneError(f"{name} is both varied and set; remove one of them")
 

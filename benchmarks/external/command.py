@@ -31,4 +31,4 @@ def external(folder: Path, timeout: float, terminal: Terminal) -> None:
     with terminal.progress(len(fmus)) as report:
         trials = run_trials(fmus, terminal.out, timeout, report)
     faults = [f"{trial.fmu} {trial.command}: {trial.text}" for trial in trials if trial.outcome == FAULT]
-    terminal.print_result(trials, make_table(trials), folder=terminal.out, failed=faults)
+    terminal.print_result(trials, make_table(trials), folder=terminal.out, failures=faults)

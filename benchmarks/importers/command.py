@@ -25,6 +25,6 @@ def importers(fmus: Path, terminal: Terminal) -> None:
 
     with terminal.progress(len(IMPORTERS)) as report:
         rows = checks.run_importer_checks(fmus, terminal.out, report)
-    failed = (f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed)
+    failures = (f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed)
     output = (checks.importer_table(rows), *checks.legend_lines(rows))
-    terminal.print_result(rows, *output, folder=terminal.out / checks.FOLDER, failed=failed)
+    terminal.print_result(rows, *output, folder=terminal.out / checks.FOLDER, failures=failures)

@@ -184,7 +184,7 @@ def fit(
     heading = next(iter(request.observe.values()), SIGNAL) if len(request.observe) == 1 else SIGNAL
 
     def load(argument: Any, name: str) -> "list[Record]":
-        loaded = [
+        loaded_records = [
             study.load_existing(str(source), options)
             if isinstance(source, str | Path)
             else to_record(source, options, heading)
@@ -192,12 +192,12 @@ def fit(
         ]
         names = [name] if len(argument) == 1 else [f"{name} {i + 1}" for i in range(len(argument))]
         return [
-            replace(record, name=given) if record.name == UNNAMED else record
-            for record, given in zip(loaded, names, strict=True)
+            replace(record, name=record_name) if record.name == UNNAMED else record
+            for record, record_name in zip(loaded_records, names, strict=True)
         ]
 
-    fitted, predicted = load(records, UNNAMED), load(validate, "the validation record")
-    if not fitted:
+    fitted_records, validation_records = load(records, UNNAMED), load(validate, "the validation record")
+    if not fitted_records:
         raise SceneError("records is empty: give at least one record")
-    request, choices = choose_columns(request, fitted + predicted)
-    return study.fit_laws(make_tasks(request, choices), fitted, predicted, reporter(progress))
+    request, choices = choose_columns(request, fitted_records + validation_records)
+    return study.fit_laws(make_tasks(request, choices), fitted_records, validation_records, reporter(progress))

@@ -21,13 +21,13 @@ def with_progress_bar(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a function so that it shows its progress, unless its argument `progress` is a function or False."""
 
     @wraps(function)
-    def shown(*arguments: P.args, **options: P.kwargs) -> R:
+    def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
         if options.get("progress") is not None:
             return function(*arguments, **options)
         with show_progress(function.__name__) as report:
             return function(*arguments, **(options | {"progress": report}))  # type: ignore[arg-type]
 
-    return shown
+    return wrapper
 
 
 def reporter(progress: Progress | bool | None) -> Progress:

@@ -206,8 +206,8 @@ def compare(
     )
     paths = [side for side in (a, b) if isinstance(side, str | Path)]
     if len(paths) == 2:
-        one, two = display_names((str(a), str(b)))
-        first, second = replace(first, label=one), replace(second, label=two)
+        first_label, second_label = display_names((str(a), str(b)))
+        first, second = replace(first, label=first_label), replace(second, label=second_label)
     elif first.name == second.name:
         first, second = replace(first, label=f"{first.name} (a)"), replace(second, label=f"{second.name} (b)")
     return ComparisonResult(**vars(difference(first, second)))

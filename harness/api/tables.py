@@ -104,8 +104,8 @@ def to_record(source: Any, options: "ColumnOptions", heading: str = SIGNAL, need
     from ..records.record import Record, load_record
 
     if is_record(source):
-        given = {name: value for name, value in vars(options).items() if value is not None}
-        record: Record = replace(source, options=replace(source.options, **given))
+        replacements = {name: value for name, value in vars(options).items() if value is not None}
+        record: Record = replace(source, options=replace(source.options, **replacements))
         return record
     if isinstance(source, str | Path):
         return load_record(str(source), options)

@@ -10,9 +10,9 @@ from .run import run_and_save, run_as_json
 from .terminal import Terminal, result_options, write_options
 
 
-def print_version(context: click.Context, option: click.Parameter, requested: bool) -> None:
+def print_version(context: click.Context, option: click.Parameter, is_requested: bool) -> None:
     """Print the package versions that provenance.json records, then exit."""
-    if requested:
+    if is_requested:
         from ..results.provenance import package_versions
 
         click.echo(", ".join(f"{name} {number}" for name, number in package_versions().items()))
@@ -77,7 +77,7 @@ def run_published_scenes(terminal: Terminal) -> None:
     scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.known]
     for scene in scenes:
         check_built(scene.run.fmu)
-    runs, rows, failed = [], [], list[str]()
+    runs, rows, failures = [], [], list[str]()
     with terminal.progress(len(scenes)) as report:
         for scene in scenes:
             check_interrupt()
@@ -85,16 +85,16 @@ def run_published_scenes(terminal: Terminal) -> None:
                 result, folder = run_and_save(scene.name, terminal.out, report)
                 runs.append(result)
                 rows.append(run_as_json(result, folder))
-                failed += filter(None, [result.failure])
+                failures += filter(None, [result.failure])
             except HarnessError as error:
                 check_interrupt()  # a Python FMU may have swallowed an interrupt
-                failed.append(str(error))
+                failures.append(str(error))
                 rows.append({"scene": scene.name, "quantities": [], "error": str(error), "comparison": None})
     text, agrees = conclude(runs)
     blocks = [tabulate_quantities(runs, everything=False), *(f"{row['scene']}: failed" for row in rows if row["error"])]
     blocks += ["", *filter(None, [explain_chatter(runs)])]
     conclusion = Text(text, style="green" if agrees else "red") if text else ""
-    terminal.print_result(rows, *blocks, folder=terminal.out, failed=failed, conclusion=conclusion)
+    terminal.print_result(rows, *blocks, folder=terminal.out, failures=failures, conclusion=conclusion)
 
 
 commands.checks = ("precision", "stability", "references")

@@ -68,7 +68,7 @@ def compare(
         source = describe_sources(first, second)
         comparison = save_result(folder, compute, "compare", source, scene=run)
     runs = [side for side in (comparison.one, comparison.two) if isinstance(side, Trajectory)]
-    failed = [run.failure for run in runs if run.failure]
+    failures = [run.failure for run in runs if run.failure]
     if within is not None or atol is not None:
-        failed += comparison.violations(within or 0.0, atol or 0.0)
-    terminal.print_result(comparison.as_json(), *comparison.blocks(), folder=folder, failed=failed)
+        failures += comparison.violations(within or 0.0, atol or 0.0)
+    terminal.print_result(comparison.as_json(), *comparison.blocks(), folder=folder, failures=failures)

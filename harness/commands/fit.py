@@ -113,19 +113,19 @@ def fit(
             "robust": robust,
             "timeout": timeout,
         }
-        loaded, predicted = (
+        fitted_records, validation_records = (
             [load_existing(file, ColumnOptions(**columns)) for file in group] for group in (records, validate)
         )
         compute = partial(
             fit_records,
             model,
-            loaded,
+            fitted_records,
             against=against,
-            validate=predicted,
+            validate=validation_records,
             progress=partial(report, records[0]),
             **arguments,
         )
-        folder = terminal.out / "fit" / loaded[0].name
+        folder = terminal.out / "fit" / fitted_records[0].name
         result = save_result(
             folder,
             compute,

@@ -72,8 +72,8 @@ def map_motions(
         compute = partial(compute, levels=None if levels is None else split_numbers(levels))
         folder = terminal.out / "map" / "-".join([resolve(source).model, *axes])
         result = save_result(folder, compute, "map", describe_sources(source))
-    failed = [f"{len(result.failures)} of {result.n_runs} runs failed"] * bool(result.failures)
-    terminal.print_result(result.as_json(), *result.blocks(), folder=folder, failed=failed)
+    failures = [f"{len(result.failures)} of {result.n_runs} runs failed"] * bool(result.failures)
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder, failures=failures)
 
 
 def split_numbers(text: str) -> list[float]:

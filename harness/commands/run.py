@@ -46,9 +46,9 @@ def run(context: click.Context, source: str, values: tuple[str, ...], run: dict[
     with terminal.progress(1) as report:
         options = {"values": parse_assignments("--set", values), **run}
         result, folder = run_and_save(source, terminal.out, report, **options)
-    failed = [f"{result.failure}; the results up to that time are in {folder}"] if result.failure else []
+    failures = [f"{result.failure}; the results up to that time are in {folder}"] if result.failure else []
     content = run_as_json(result, folder) if result.scene else result.as_json() | {"folder": folder}
-    terminal.print_result(content, *result.blocks(), folder=folder, failed=failed)
+    terminal.print_result(content, *result.blocks(), folder=folder, failures=failures)
 
 
 def run_and_save(

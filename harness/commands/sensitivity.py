@@ -53,11 +53,11 @@ def sensitivity(
     from ..scenes.assignments import parse_assignments
     from ..simulation.resolve import resolve
 
-    given = {name: value for name, value in options.items() if is_given(context, name)}
+    explicit_options = {name: value for name, value in options.items() if is_given(context, name)}
     settings = parse_assignments("--set", values)
     with terminal.progress(1) as report:
         progress = partial(report, source)
-        compute = partial(compute_sensitivity, source, parameters, settings, **given, progress=progress)
+        compute = partial(compute_sensitivity, source, parameters, settings, **explicit_options, progress=progress)
         folder = terminal.out / "sensitivity" / resolve(source).model
         result = save_result(folder, compute, "sensitivity", describe_sources(source))
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

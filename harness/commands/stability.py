@@ -35,4 +35,4 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
     with terminal.progress(sum(map(len, groups))) as report:
         compute, source = partial(measure_stability, groups, report), describe_sources(*models)
         result = save_result(folder, compute, "stability", source, files=fmus.values(), parameters=parameters)
-    terminal.print_result(result.as_json(), *result.blocks(), folder=folder, failed=result.describe_failures())
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder, failures=result.describe_failures())

@@ -78,7 +78,7 @@ def sweep(
     from ..scenes.fmu_files import find_fmu
 
     refuse_ignored_options(context, [find_fmu(model)], timeout_is_ignored=True)
-    measured = [word.strip() for word in measures.split(",")] if measures is not None else ()
+    measure_names = [word.strip() for word in measures.split(",")] if measures is not None else ()
     grid = dict(map(split_range, vary))
     if len(grid) < len(vary):
         raise SceneError("--vary names a parameter twice")
@@ -89,15 +89,15 @@ def sweep(
             values=parse_assignments("--set", values),
             samples=samples,
             seed=seed,
-            measures=measured,
+            measures=measure_names,
             workers=workers,
             folder=terminal.out,
             name=name,
             progress=partial(report, model),
             **run,
         )
-    failed = [*result.describe_failures()]
-    terminal.print_result(result.as_json(), *result.blocks(), folder=result.folder, failed=failed)
+    failures = [*result.describe_failures()]
+    terminal.print_result(result.as_json(), *result.blocks(), folder=result.folder, failures=failures)
 
 
 def split_range(text: str) -> tuple[str, str]:

@@ -40,8 +40,8 @@ def write_options(command: click.Command, context: click.Context, formatter: cli
     """Write the options of a command to its help, in sections."""
     options = [item for item in command.get_params(context) if isinstance(item, click.Option)]
     records = {option.name: option.get_help_record(context) for option in options}
-    shared = {name for names in SECTIONS.values() for name in names}
-    for title, names in {"Options": [name for name in records if name not in shared], **SECTIONS}.items():
+    section_names = {name for names in SECTIONS.values() for name in names}
+    for title, names in {"Options": [name for name in records if name not in section_names], **SECTIONS}.items():
         if rows := [row for name in names if (row := records.get(name))]:
             with formatter.section(title):
                 formatter.write_dl(rows)
@@ -222,8 +222,8 @@ def run_options(command: Command) -> Command:
 
     @wraps(command)
     def wrapper(**options: Any) -> Any:
-        given = {name: value for name in RUN_NAMES if (value := options.pop(name)) not in (None, False)}
-        return command(run=given, **options)
+        run_settings = {name: value for name in RUN_NAMES if (value := options.pop(name)) not in (None, False)}
+        return command(run=run_settings, **options)
 
     result: Command = wrapper
     for option in reversed(RUN_OPTIONS):
@@ -266,14 +266,14 @@ def progress(is_shown: bool, total: int) -> Iterator[Callable[[str, float], None
         Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar,
     ):
         task = bar.add_task("reading", total=total)
-        started: list[str] = []
+        started_scenes: list[str] = []
 
         def report(name: str, share: float) -> None:
             check_interrupt()
-            if name not in started:
-                started.append(name)
+            if name not in started_scenes:
+                started_scenes.append(name)
             description = ": ".join(filter(None, (name, getattr(share, "note", ""))))
-            bar.update(task, description=description, completed=len(started) - 1 + share)
+            bar.update(task, description=description, completed=len(started_scenes) - 1 + share)
 
         yield report
 
@@ -296,7 +296,12 @@ class Terminal:
         return progress(not self.as_json, total)
 
     def print_result(
-        self, result: Any, *blocks: Any, folder: Path | None = None, failed: Iterable[str] = (), conclusion: Any = None
+        self,
+        result: Any,
+        *blocks: Any,
+        folder: Path | None = None,
+        failures: Iterable[str] = (),
+        conclusion: Any = None,
     ) -> None:
         """Print the result as JSON, or as tables and sentences.
 
@@ -308,7 +313,7 @@ class Terminal:
             Tables and sentences to print otherwise.
         folder
             Folder of the result; printed after them, with a note if an earlier result was replaced.
-        failed
+        failures
             Error messages.
         conclusion
             Sentence to print last, unless there are error messages.
@@ -316,7 +321,7 @@ class Terminal:
         Raises
         ------
         HarnessError
-            If `failed` is not empty.
+            If `failures` is not empty.
         """
         from rich.console import Console
 
@@ -330,7 +335,7 @@ class Terminal:
                 from ..results.provenance import replacement_note
 
                 console.print("\n".join(filter(None, (replacement_note(folder), f"Results in {folder}"))))
-        messages = [*failed]
+        messages = [*failures]
         if conclusion and not (messages or self.as_json):
             console.print(conclusion)
         if messages:

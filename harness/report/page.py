@@ -111,13 +111,13 @@ def build_sections(items: list[ResultItem]) -> list[Section]:
     Runs that are compared with known values, as those of the project, are last within their section.
     """
     items = sorted(items, key=is_compared)
-    known = {study.name: Section(study.name, study.title, study.intro) for study in STUDIES}
+    study_sections = {study.name: Section(study.name, study.title, study.intro) for study in STUDIES}
     others = {item.summary.study: Section(item.summary.study, item.summary.study, "") for item in items}
     sections = [
         replace(section, items=tuple(item for item in items if item.summary.study == section.study))
-        for section in (others | known).values()
+        for section in (others | study_sections).values()
     ]
-    order = [*known, *others]
+    order = [*study_sections, *others]
     return sorted(
         (section for section in sections if section.items),
         key=lambda section: (all(map(is_compared, section.items)), order.index(section.study)),

@@ -72,9 +72,9 @@ def write_data(result: Any, file: Path) -> None:
     """Write a dataclass of numbers, texts, paths, arrays, and containers and dataclasses of these."""
     arrays: list[np.ndarray] = []
     content = json.dumps(simplify(result, arrays))
-    named: dict[str, Any] = {CONTENT: np.array(content)} | {str(i): array for i, array in enumerate(arrays)}
+    named_arrays: dict[str, Any] = {CONTENT: np.array(content)} | {str(i): array for i, array in enumerate(arrays)}
     with file.open("wb") as stream:
-        np.savez(stream, **named)
+        np.savez(stream, **named_arrays)
 
 
 def read_data(kind: type[T], file: Path) -> T:
@@ -86,8 +86,8 @@ def read_data(kind: type[T], file: Path) -> T:
         If the file is damaged, or of another class or version.
     """
     try:
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            result: T = rebuild(kind, json.loads(str(stored[CONTENT])), stored)
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+            result: T = rebuild(kind, json.loads(str(archive[CONTENT])), archive)
         return result
     except Exception as error:  # a damaged file may cause any exception in zipfile and numpy
         reason = first_line(error) or type(error).__name__
@@ -129,7 +129,7 @@ def rebuild(kind: Any, value: Any, arrays: Any) -> Any:
     if origin in (dict, Mapping):
         return {rebuild(parameters[0], key, arrays): rebuild(parameters[1], item, arrays) for key, item in value}
     if origin is tuple and parameters[-1] is not Ellipsis:
-        return tuple(rebuild(item, one, arrays) for item, one in zip(parameters, value, strict=True))
+        return tuple(rebuild(item, element, arrays) for item, element in zip(parameters, value, strict=True))
     if origin in (tuple, list):
         return origin(rebuild(parameters[0], item, arrays) for item in value)
     return Path(value) if kind is Path else value

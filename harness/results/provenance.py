@@ -24,7 +24,7 @@ from .files import to_json
 
 FILE = "provenance.json"
 HARNESS = "friction-fmus"
-REPLACED = "replaced"
+REPLACEMENT_KEY = "replaced"
 # options of a result that follow from its parameters or input files
 IMPLIED_OPTIONS = {"values", "name", "fmu", "file", "source", "equal_steps"}
 KNOWN_VALUES = {"published", "reference", "parameter", "citation", "remark"}  # of a scene; they do not change its run
@@ -216,8 +216,8 @@ def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
         {name: value for name, value in settings.items() if name not in KNOWN_VALUES}
         for settings in ((item.get("run") or {}) | (item["scene"] or {}) for item in (before, after))
     )
-    unchanged = [name for name in options if name in IMPLIED_OPTIONS or options[name] == new_options.get(name)]
-    differences += [format_option(name, value) for name, value in options.items() if name not in unchanged]
+    unchanged_names = [name for name in options if name in IMPLIED_OPTIONS or options[name] == new_options.get(name)]
+    differences += [format_option(name, value) for name, value in options.items() if name not in unchanged_names]
     differences += [f"another {name}" for name, value in before["files"].items() if value != after["files"].get(name)]
     if differences:
         sentence = f"It replaces the result of {before['date']}, which had {', '.join(sorted(differences))}."
@@ -229,7 +229,7 @@ def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
         sentence = f"The result of {before['date']} was {comparison}."
     else:
         return
-    (new_folder / FILE).write_text(to_json(after | {REPLACED: sentence}) + "\n", encoding="utf-8")
+    (new_folder / FILE).write_text(to_json(after | {REPLACEMENT_KEY: sentence}) + "\n", encoding="utf-8")
 
 
 def format_option(name: str, value: object) -> str:
@@ -240,7 +240,7 @@ def format_option(name: str, value: object) -> str:
 def replacement_note(folder: Path) -> str:
     """Return the note about the replaced result; empty if there was none."""
     try:
-        return str(read_table(folder / FILE).get(REPLACED, ""))
+        return str(read_table(folder / FILE).get(REPLACEMENT_KEY, ""))
     except (OSError, SceneError):
         return ""
 

@@ -96,14 +96,14 @@ def format_interval(value: float, low: float, high: float) -> str:
     return f"{value:.{digits}g} ({low:.{digits}g} to {high:.{digits}g})"
 
 
-def step_size_quantities(h: np.ndarray, refused: int, collapse: float | None = None) -> tuple[Quantity, ...]:
+def step_size_quantities(h: np.ndarray, n_rejected: int, collapse: float | None = None) -> tuple[Quantity, ...]:
     """Return the statistics of step sizes.
 
     Parameters
     ----------
     h : numpy.ndarray
         Accepted step sizes (n,) in s.
-    refused : int
+    n_rejected : int
         Number of rejected steps.
     collapse : float, optional
         Reduction of the step size at reversals; None without reversals.
@@ -113,7 +113,7 @@ def step_size_quantities(h: np.ndarray, refused: int, collapse: float | None = N
         Quantity("mean_step", published_mean_step(h), "s", "mean step"),
         Quantity("smallest_step", float(h.min()), "s", "smallest step"),
         Quantity("largest_step", float(h.max()), "s", "largest step"),
-        Quantity("refused", refused / (refused + len(h)), "1", "share of refused steps"),
+        Quantity("refused", n_rejected / (n_rejected + len(h)), "1", "share of refused steps"),
     ]
     if collapse is not None:
         quantities.append(Quantity("collapse", collapse, "1", "collapse at reversals"))

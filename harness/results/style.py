@@ -139,8 +139,8 @@ def save_figure(figure: Figure, path: Path) -> None:
         figure.set_layout_engine(None)  # otherwise everything is drawn twice
     svg = StringIO()
     figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
-    rounded = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), svg.getvalue())
-    path.write_text(rounded.replace("</style>", f"{DARK_STYLE}</style>", 1), encoding="utf-8")
+    svg_text = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), svg.getvalue())
+    path.write_text(svg_text.replace("</style>", f"{DARK_STYLE}</style>", 1), encoding="utf-8")
 
 
 def is_crowded(element: artist.Artist) -> bool:
@@ -165,9 +165,9 @@ def wrap_text(text: Text, width: float) -> None:
     """Break a text that is longer than `width` pixels into lines."""
     extent, lines = text.get_window_extent(), text.get_text().splitlines()
     if (longest := max(extent.width, extent.height)) > width:
-        folded = textwrap.TextWrapper(max(1, int(max(map(len, lines)) * width / longest)))
-        folded.wordsep_re = LINE_BREAKS
-        text.set_text("\n".join(map(folded.fill, lines)))
+        wrapper = textwrap.TextWrapper(max(1, int(max(map(len, lines)) * width / longest)))
+        wrapper.wordsep_re = LINE_BREAKS
+        text.set_text("\n".join(map(wrapper.fill, lines)))
 
 
 def is_drawable(values: Any) -> Any:

@@ -317,5 +317,7 @@ def format_blocks(blocks: Iterable[ResultTable | str], width: int) -> str:
 
 def format_html(blocks: Iterable[ResultTable | str]) -> str:
     """Return tables and sentences as HTML."""
-    shown = (block for block in blocks if block != "")
-    return "".join(block.as_html() if isinstance(block, ResultTable) else f"<p>{escape(block)}</p>" for block in shown)
+    nonempty_blocks = (block for block in blocks if block != "")
+    return "".join(
+        block.as_html() if isinstance(block, ResultTable) else f"<p>{escape(block)}</p>" for block in nonempty_blocks
+    )

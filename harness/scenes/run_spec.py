@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ..arguments import NAMES, POSITIVE, SETTINGS, Rule, increasing_row, whole
+from ..arguments import NAMES, POSITIVE, SETTINGS, Rule, increasing_row, whole_number
 from .roles import find_roles
 from .schema import field_names, parse_table
 
@@ -73,7 +73,7 @@ class RunOptions:
     equal_steps: int = 0
     interval: Annotated[float | None, POSITIVE] = None
     follow: bool = True
-    repeat: Annotated[int, whole(1, MAX_REPEATS)] = 1
+    repeat: Annotated[int, whole_number(1, MAX_REPEATS)] = 1
     tolerance: Annotated[float | None, POSITIVE] = None
     exchange: bool = False
     lenient: bool = False
@@ -107,9 +107,9 @@ class RunSpec(RunOptions):
     values: Annotated[dict[str, Any], SETTINGS] = field(default_factory=dict)
 
     @classmethod
-    def from_json(cls, stored: Mapping[str, Any]) -> "RunSpec":
+    def from_json(cls, table: Mapping[str, Any]) -> "RunSpec":
         """Return the specification in a table, where null stands for a default; SceneError if it is invalid."""
-        return parse_table({name: value for name, value in stored.items() if value is not None}, cls)
+        return parse_table({name: value for name, value in table.items() if value is not None}, cls)
 
     @property
     def options(self) -> dict[str, Any]:

@@ -39,14 +39,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from ..arguments import NAMES, POSITIVE, TEXT, Rule, above_zero, choice, real, text, whole
+from ..arguments import NAMES, POSITIVE, TEXT, Rule, above_zero, choice, real, text, whole_number
 from ..errors import SceneError, check_names, unknown_name_message, unknown_source_message
 from .fmu_files import find_fmu
 from .roles import ROLES, find_roles
 from .run_spec import DEFAULT_EQUAL_STEPS, SCENE_KEYS, RunSpec
 from .schema import TITLE, field_names, parse_table, read_toml
 
-SHIPPED = Path(__file__).parent
+SCENE_FOLDER = Path(__file__).parent
 MAX_DEFAULT_PLOTS = 6  # time plots by default
 SHORT_KEYS = {  # keys that set a variable of the FMU
     "method": "solver.method",
@@ -109,7 +109,7 @@ class Citation:
 
     author: Annotated[str, TITLE]
     title: Annotated[str, TITLE]
-    year: Annotated[int, whole(1, LAST_YEAR)]
+    year: Annotated[int, whole_number(1, LAST_YEAR)]
     location: Annotated[str, TITLE]
 
     def __str__(self) -> str:
@@ -209,13 +209,13 @@ class Scene:
     @property
     def presentation(self) -> dict[str, Any]:
         """Return all of the scene except its run, by the keys of a scene file, for the provenance."""
-        own = {name: value for name, value in vars(self).items() if name not in ("run", "known")}
-        return own | (self.known.tables if self.known else {})
+        content = {name: value for name, value in vars(self).items() if name not in ("run", "known")}
+        return content | (self.known.tables if self.known else {})
 
 
 def shipped_scenes() -> list[Path]:
     """Return the files of the built-in scenes, sorted by name."""
-    return sorted(SHIPPED.glob("*.toml"), key=lambda file: file.stem)
+    return sorted(SCENE_FOLDER.glob("*.toml"), key=lambda file: file.stem)
 
 
 def load_scene(scene: str | Path) -> Scene:
@@ -228,11 +228,11 @@ def load_scene(scene: str | Path) -> Scene:
     """
     path = Path(scene)
     if path.suffix != ".toml":
-        path = SHIPPED / f"{scene}.toml"
+        path = SCENE_FOLDER / f"{scene}.toml"
         if path not in shipped_scenes():
             names = [file.stem for file in shipped_scenes()]
             raise SceneError(unknown_source_message("scene", str(scene), names, ", or the path of a .toml file"))
-    source = path.stem if path.parent.resolve() == SHIPPED.resolve() else str(path.resolve())
+    source = path.stem if path.parent.resolve() == SCENE_FOLDER.resolve() else str(path.resolve())
     table = read_toml(path)
     try:
         return build_scene(path, table, source)
@@ -242,17 +242,17 @@ def load_scene(scene: str | Path) -> Scene:
 
 def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
     """Build a scene from the table in its file."""
-    allowed = {*field_names(SceneKeys), *SCENE_KEYS}
-    if unknown := {*table} - allowed:
-        raise SceneError(unknown_name_message("key", min(unknown), allowed))
+    allowed_keys = {*field_names(SceneKeys), *SCENE_KEYS}
+    if unknown := {*table} - allowed_keys:
+        raise SceneError(unknown_name_message("key", min(unknown), allowed_keys))
     keys = parse_table({name: value for name, value in table.items() if name not in SCENE_KEYS}, SceneKeys)
     run = build_run(locate_fmu(path, keys), keys, table)
     plots = default_plots(run.outputs) if keys.plots is None else keys.plots
     check_names("name in analyses", keys.analyses, ANALYSES)
     check_names("name in plots", plots, (*PLOTS, *run.outputs))
-    known = find_known_values(keys)
+    known_values = find_known_values(keys)
     texts = keys.title, keys.about, keys.remark
-    scene = Scene(path.stem, source, run, *texts, keys.analyses, plots, keys.decay, known)
+    scene = Scene(path.stem, source, run, *texts, keys.analyses, plots, keys.decay, known_values)
     check_requirements(scene)
     return scene
 
@@ -261,12 +261,16 @@ def change_run(scene: Scene, run: RunSpec) -> Scene:
     """Return a scene with another run; its known values hold no longer, but for parameters that keep their value."""
     if run == scene.run:
         return scene
-    known = scene.known
-    if known:
-        is_kept = {name: run.values.get(name) == scene.run.values.get(name) for name in known.values}
-        kept = {name: value for name, value in known.values.items() if known.kind == "parameter" and is_kept[name]}
-        known = replace(known, values=kept) if kept else None
-    return replace(scene, run=run, known=known, remark=scene.remark if known == scene.known else "")
+    known_values = scene.known
+    if known_values:
+        is_kept = {name: run.values.get(name) == scene.run.values.get(name) for name in known_values.values}
+        kept_values = {
+            name: value
+            for name, value in known_values.values.items()
+            if known_values.kind == "parameter" and is_kept[name]
+        }
+        known_values = replace(known_values, values=kept_values) if kept_values else None
+    return replace(scene, run=run, known=known_values, remark=scene.remark if known_values == scene.known else "")
 
 
 def find_known_values(keys: SceneKeys) -> KnownValues | None:

@@ -79,8 +79,8 @@ def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
     """
     origin, arguments = get_origin(annotation), get_args(annotation)
     if NoneType in arguments:
-        (required,) = (one for one in arguments if one is not NoneType)
-        return None if value is None else convert(value, required, path, faults)
+        (value_type,) = (item for item in arguments if item is not NoneType)
+        return None if value is None else convert(value, value_type, path, faults)
     try:
         value = find_rule(annotation).check(path, value)
     except SceneError as error:
@@ -101,9 +101,13 @@ def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faul
     names = field_names(schema)
     if unknown := table.keys() - set(names):
         faults.append((0, unknown_name_message(f"key in [{path}]" if path else "key", min(unknown), names)))
-    required = {one.name for one in fields(schema) if one.default is MISSING and one.default_factory is MISSING}
+    required_keys = {
+        field.name for field in fields(schema) if field.default is MISSING and field.default_factory is MISSING
+    }
     faults += [
-        (2, f"the key '{join_key_path(path, key)}' is missing") for key in names if key in required and key not in table
+        (2, f"the key '{join_key_path(path, key)}' is missing")
+        for key in names
+        if key in required_keys and key not in table
     ]
     types = type_hints(schema)
     values = {key: convert(table[key], types[key], join_key_path(path, key), faults) for key in names if key in table}
@@ -123,12 +127,12 @@ def type_hints(schema: Any) -> dict[str, Any]:
 
 def find_rule(annotation: Any) -> Rule:
     """Return the rule that annotates a type, or that follows from it; an optional type has that of its values."""
-    if stated := [item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Rule)]:
-        return stated[0]
+    if rules := [item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Rule)]:
+        return rules[0]
     origin, arguments = get_origin(annotation), get_args(annotation)
     if NoneType in arguments:
-        (required,) = (one for one in arguments if one is not NoneType)
-        return find_rule(required)
+        (value_type,) = (item for item in arguments if item is not NoneType)
+        return find_rule(value_type)
     if is_dataclass(annotation) or origin in (dict, Mapping):
         return TABLE
     return LIST if origin is tuple else PLAIN[annotation]

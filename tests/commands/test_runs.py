@@ -76,7 +76,7 @@ def test_the_main_job_names_each_case_that_differs(workspace, monkeypatch):
     """In red, as in a terminal; the exit status is that of the runs."""
     (workspace / "scenes").mkdir()
     shutil.copy(ROOT / "harness/scenes/coulomb-stop.toml", workspace / "scenes")
-    monkeypatch.setattr("harness.scenes.scene.SHIPPED", workspace / "scenes")
+    monkeypatch.setattr("harness.scenes.scene.SCENE_FOLDER", workspace / "scenes")
     monkeypatch.setattr("harness.studies.run.result.MAX_DEVIATION", -1.0)
     result = harness(workspace, "--out", "results", FORCE_COLOR="1")
     assert result.returncode == 0
@@ -281,7 +281,7 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
     reference_table = "\n[reference]\nsource = 'me'\nrun_time = 1\n"
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
         (workspace / f"{name}.toml").write_text(BASE + extra + reference_table)
-    monkeypatch.setattr("harness.scenes.scene.SHIPPED", workspace)
+    monkeypatch.setattr("harness.scenes.scene.SCENE_FOLDER", workspace)
     result = harness(workspace, "--out", workspace / "out")
     assert result.returncode == 1
     assert result.stderr.startswith("Error: scene bad: mu_d is 0.95")
