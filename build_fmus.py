@@ -64,15 +64,15 @@ from fmus.compiler.model_lookup import find_model, model_names, more_model_names
 from fmus.packaging.archive import build
 
 LOG = logging.getLogger("fmus.build")
-HERE = Path(__file__).parent
+SCRIPT_FOLDER = Path(__file__).parent
 # an installed package builds into the current folder
-FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
+FMUS = SCRIPT_FOLDER / "fmus" if (SCRIPT_FOLDER / "pyproject.toml").is_file() else Path("fmus")
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("models", metavar="[NAME | FILE.py]...", nargs=-1)
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="FMI version; 3 implies --native.")
-@click.option("--native", "compiled", is_flag=True, help="Compile to machine code; the FMU contains no Python.")
+@click.option("--native", "is_native", is_flag=True, help="Compile to machine code; the FMU contains no Python.")
 @click.option("--more", is_flag=True, help="Build the models of fmus/more.")
 @click.option(
     "--web",
@@ -121,7 +121,7 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
 def main(
     models: tuple[str, ...],
     fmi: str,
-    compiled: bool,
+    is_native: bool,
     more: bool,
     web: bool,
     methods: tuple[str, ...],
@@ -147,13 +147,13 @@ def main(
       friction-fmus build --release dist
     """
     click.get_current_context().with_resource(temporary_files())
-    if web and (compiled or platforms or real_only or fmi == "3"):
+    if web and (is_native or platforms or real_only or fmi == "3"):
         raise CommandLineError("--web writes a page, not FMUs: remove --native, --real-only, --platform and --fmi 3.")
     if release is not None:
         if (
             models
             or more
-            or compiled
+            or is_native
             or web
             or methods
             or laws
@@ -166,12 +166,12 @@ def main(
             raise CommandLineError("--release builds everything: remove the other options and models.")
         print_summary(release_archive(release))
         return
-    if stages is not None and (compiled or web or real_only or platforms or out or fmi == "3"):
+    if stages is not None and (is_native or web or real_only or platforms or out or fmi == "3"):
         raise CommandLineError(
             "--stages writes texts, not FMUs: remove --native, --web, --real-only, --platform, --out and --fmi 3."
         )
-    compiled = compiled or fmi == "3"
-    subfolder = Path("real-only" if real_only else "", "native" if compiled else "", "fmi3" if fmi == "3" else "")
+    is_native = is_native or fmi == "3"
+    subfolder = Path("real-only" if real_only else "", "native" if is_native else "", "fmi3" if fmi == "3" else "")
     try:
         names = models if models and not more else (*models, *(more_model_names() if more else model_names()))
         sources = {model: find_model(model) for model in names}
@@ -201,7 +201,7 @@ def main(
         folder = out or default_folder(model, source) / subfolder
         LOG.debug("the build of %s starts", model)
         try:
-            if compiled:
+            if is_native:
                 with show_progress(
                     f"{source.name}: compiling (the first build also compiles the C libraries, half a minute)"
                 ):

@@ -20,23 +20,25 @@ LOSSES = NAMES[1:]
 def table_row(path: Path) -> list[str]:
     """Return the row of a record: values, or the sentence that refuses it, and windows that disagree."""
     try:
-        whole = identify_decay(path)
+        complete_fit = identify_decay(path)
     except HarnessError as refusal:
         return [path.stem, str(refusal)]
     disagreements: set[str] = set()
     for count in (2, 3):
-        edges = np.linspace(whole.t[0], whole.t[-1], count + 1)
+        edges = np.linspace(complete_fit.t[0], complete_fit.t[-1], count + 1)
         fits = []
         for begin, end in pairwise(edges):
             try:
                 fits.append(identify_decay(path, begin=begin, end=end))
             except HarnessError:
                 disagreements.add(f"refused from {begin:.3g} to {end:.3g} s")
-        for one, other in combinations(fits, 2):
+        for fit, other in combinations(fits, 2):
             disagreements |= {
-                name for name in LOSSES if max(one[name].low, other[name].low) > min(one[name].high, other[name].high)
+                name for name in LOSSES if max(fit[name].low, other[name].low) > min(fit[name].high, other[name].high)
             }
-    values = [format_interval(whole[name].value, whole[name].low, whole[name].high) for name in NAMES]
+    values = [
+        format_interval(complete_fit[name].value, complete_fit[name].low, complete_fit[name].high) for name in NAMES
+    ]
     return [path.stem, *values, ", ".join(sorted(disagreements)) or "none"]
 
 

@@ -277,22 +277,22 @@ def plot_stability(table: Path, path: Path) -> None:
     """Plot the cases of stickslip in a table of `stability`."""
     with table.open(newline="") as file:
         cases = list(csv.DictReader(file))
-    finished = [case for case in cases if case["expected"].startswith("finished within ") and case["error [1]"]]
-    methods = list(dict.fromkeys(case["method"] for case in finished))
+    finished_cases = [case for case in cases if case["expected"].startswith("finished within ") and case["error [1]"]]
+    methods = list(dict.fromkeys(case["method"] for case in finished_cases))
     style = {"font.size": 9, "svg.fonttype": "path", "svg.hashsalt": "friction", "axes.titlelocation": "left"}
     style |= {"axes.titlesize": 9, "axes.grid": True, "grid.color": "#dddddd"}
     with plt.rc_context(style):
         figure, axis = plt.subplots(figsize=(5.6, 2.4), layout="constrained")
         for row, method in enumerate(methods):
-            own = [case for case in finished if case["method"] == method]
-            pairs = [(float(case["error [1]"]), float(case["expected"].rsplit(" ", 1)[1])) for case in own]
+            method_cases = [case for case in finished_cases if case["method"] == method]
+            pairs = [(float(case["error [1]"]), float(case["expected"].rsplit(" ", 1)[1])) for case in method_cases]
             shares = [error / bound if error else 0.0 for error, bound in pairs]  # a bound may be 0
             axis.semilogx(np.maximum(shares, 1e-6), [row] * len(shares), "o", color="#0072B2", ms=5, alpha=0.5)
         axis.axvline(1.0, color="#D55E00")
-        refused = sum(not case["expected"].startswith("finished") for case in cases)
+        n_refused = sum(not case["expected"].startswith("finished") for case in cases)
         axis.set(yticks=range(len(methods)), yticklabels=methods, xlim=(5e-7, 20.0), ylim=(len(methods) - 0.5, -0.5))
         axis.set_xlabel("error / bound (1e-6 and less at the left edge)")
-        axis.set_title(f"stickslip: {len(finished)} stiff and extreme cases; {refused} more are refused")
+        axis.set_title(f"stickslip: {len(finished_cases)} stiff and extreme cases; {n_refused} more are refused")
         figure.savefig(path, metadata={"Date": None})
     plt.close(figure)
 
@@ -366,11 +366,11 @@ def save_screenshot(page: Path, picture: Path, folder: Path, height: int, read: 
     ]
     for action in (f"--screenshot={folder / picture.name}", "--dump-dom"):
         command = [chromium, *options, action, page.as_uri()]
-        done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
+        process = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
     from PIL import Image, PngImagePlugin
 
     image, information = Image.open(folder / picture.name).convert("RGB"), PngImagePlugin.PngInfo()
-    information.add_itxt("Description", read(done.stdout))
+    information.add_itxt("Description", read(process.stdout))
     image.quantize(64).save(picture, optimize=True, pnginfo=information)
 
 
@@ -394,9 +394,9 @@ def reduce_colours(png: str) -> str:
     """Return a PNG picture in base64 with 64 colours, which makes it smaller."""
     from PIL import Image
 
-    image, reduced = Image.open(BytesIO(b64decode(png))).convert("RGB"), BytesIO()
-    image.quantize(64).save(reduced, "png", optimize=True)
-    return b64encode(reduced.getvalue()).decode()
+    image, picture = Image.open(BytesIO(b64decode(png))).convert("RGB"), BytesIO()
+    image.quantize(64).save(picture, "png", optimize=True)
+    return b64encode(picture.getvalue()).decode()
 
 
 INLINE = "module://matplotlib_inline.backend_inline"

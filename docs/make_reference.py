@@ -172,10 +172,10 @@ def schema_within(schema: Any, key: str) -> Any:
 
 def keys(texts: dict[str, str], *schemas: Any) -> str:
     """Return the table of the keys that have a text; they are fields of the dataclasses of the schema."""
-    declared = {field.name: field for schema in schemas for field in fields(schema)}
+    declared_fields = {field.name: field for schema in schemas for field in fields(schema)}
     rows = []
     for name, text in texts.items():
-        field = declared[name]
+        field = declared_fields[name]
         if field.default is MISSING and field.default_factory is MISSING:
             text += " Required."
         elif field.default not in (None, MISSING, (), "", False) and "Default:" not in text:
@@ -237,11 +237,11 @@ def command_options() -> str:
 
 def command_texts() -> str:
     """Return description, usage and options of every command."""
-    shared = shared_options()
-    return "\n".join(command_text(name, command, shared) for name, command in all_commands().items())
+    common_options = shared_options()
+    return "\n".join(command_text(name, command, common_options) for name, command in all_commands().items())
 
 
-def command_text(name: str, command: Any, shared: list[tuple[str, str]]) -> str:
+def command_text(name: str, command: Any, common_options: list[tuple[str, str]]) -> str:
     """Return the section of one command, which only names the shared options."""
     import click
 
@@ -252,8 +252,8 @@ def command_text(name: str, command: Any, shared: list[tuple[str, str]]) -> str:
         lines.append(f"```text\n{paragraph[2:]}\n```\n" if verbatim else f"{' '.join(paragraph.split())}\n")
     lines.append(f"```text\n{name} {' '.join(command.collect_usage_pieces(context))}\n```\n")
     records = option_records(context)
-    rows = [(f"`{option}`", text) for option, text in records if (option, text) not in shared]
-    names = ", ".join(f"`{record[0].split()[0]}`" for record in records if record in shared)
+    rows = [(f"`{option}`", text) for option, text in records if (option, text) not in common_options]
+    names = ", ".join(f"`{record[0].split()[0]}`" for record in records if record in common_options)
     if names:
         lines.append(f"[Shared options](#shared-options): {names}.\n")
     return "\n".join(lines) + (f"\n{format_table(('option', 'meaning'), rows)}" if rows else "")

@@ -46,7 +46,7 @@ class Block:
         Indentation in the page.
     span : tuple of (int, int)
         Start and end of the text in the page, in characters.
-    skipped : str
+    skip_reason : str
         Reason for which the block is not run; empty if it is run.
     """
 
@@ -56,7 +56,7 @@ class Block:
     line: int
     indent: str
     span: tuple[int, int]
-    skipped: str
+    skip_reason: str
 
 
 def find_blocks(page: str) -> list[Block]:
@@ -109,13 +109,13 @@ def run_page(page: Path, write: bool = False) -> list[str]:
             if block.title:
                 Path(block.title).parent.mkdir(parents=True, exist_ok=True)
                 Path(block.title).write_text(block.text, encoding="utf-8")
-            elif block.language in RUN and not block.skipped:
+            elif block.language in RUN and not block.skip_reason:
                 output, last_language = run(block, page, names), block.language
                 continue
             elif (
                 block.language == "text"
                 and last_language
-                and not block.skipped
+                and not block.skip_reason
                 and not check.check_output(block.text, output, options)
             ):
                 failures.append(f"{page.name}, line {block.line}: the output is\n{output}")

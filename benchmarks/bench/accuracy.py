@@ -23,18 +23,18 @@ from harness.simulation.step_sequence import RefusedRun, run_steps
 from .benchmark import SETTINGS, Baseline, Benchmark
 
 POINTS = 1600
-CLOSED = Baseline("closed form in 120 digits")
+CLOSED_FORM = Baseline("closed form in 120 digits")
 
 
 def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
     """Return the accuracy benchmarks."""
     infos = {model: read_info(model) for model in MODELS}
-    closed = [model for model in MODELS if "exact" in infos[model].methods]
+    exact_models = [model for model in MODELS if "exact" in infos[model].methods]
     return [
-        *(partial(exact_run_error, model, infos[model]) for model in closed),
+        *(partial(exact_run_error, model, infos[model]) for model in exact_models),
         *(
             partial(event_time_error, model, infos[model])
-            for model in closed
+            for model in exact_models
             if "friction" in infos[model].enumerations
         ),
         partial(last_event_error, "coulomb", {"f": 1e-7}, 300_000, turning_time),
@@ -73,7 +73,7 @@ def max_error(model: str, info: FmuInfo, settings: dict[str, float | str]) -> fl
 
 
 def exact_run_error(model: str, info: FmuInfo) -> Benchmark:
-    return Benchmark(f"{model}, exact: whole run", max_error(model, info, {}), "1", 1e-13, (CLOSED,))
+    return Benchmark(f"{model}, exact: whole run", max_error(model, info, {}), "1", 1e-13, (CLOSED_FORM,))
 
 
 def default_run_error(model: str, info: FmuInfo, name: str, value: float | str, target: float) -> Benchmark:
@@ -93,7 +93,7 @@ def event_time_error(model: str, info: FmuInfo) -> Benchmark:
     if [mode for _, mode in events] != [mode for _, mode in expected]:
         raise HarnessError(f"{model}: the modes after events are wrong")
     largest_error = max(abs(t / t_reference - 1) for (t, _), (t_reference, _) in zip(events, expected, strict=True))
-    return Benchmark(f"{model}, exact: times of {len(events)} events", largest_error, "1", 1e-14, (CLOSED,))
+    return Benchmark(f"{model}, exact: times of {len(events)} events", largest_error, "1", 1e-14, (CLOSED_FORM,))
 
 
 def last_event_error(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Benchmark:
@@ -108,7 +108,7 @@ def last_event_error(model: str, values: dict[str, float], number: int, law: Cal
         raise HarnessError(f"{model}: {events.count} events, not {number}")
     largest_error = float(abs(events.t_last - t_reference)) / ulp(events.t_last)
     name = f"{model}, exact: the last of {number} events, units in the last place"
-    return Benchmark(name, largest_error, "1", 4.0, (CLOSED,))
+    return Benchmark(name, largest_error, "1", 4.0, (CLOSED_FORM,))
 
 
 def turning_time(model: Any, number: int) -> Any:
@@ -132,12 +132,12 @@ def between_grids(model: str, info: FmuInfo) -> Benchmark:
     """Measure the largest relative difference at common times between runs on a uniform and on a random grid."""
     uniform = [info.stop * i / 200 for i in range(201)]
     random = Random(model)
-    both = sorted({*uniform, *(random.uniform(0.0, info.stop) for _ in range(777))})
+    merged_times = sorted({*uniform, *(random.uniform(0.0, info.stop) for _ in range(777))})
     spec = RunSpec(find_fmu(model), values=info.start_values, stop=info.stop)
-    one, other = run_through_times(spec, uniform), run_through_times(spec, both)
-    shared = np.searchsorted(both, uniform)
-    parts = zip(one, other, strict=True)
-    largest_error = max(float(np.abs(a - b[shared]).max() / np.abs(a).max()) for a, b in parts)
+    uniform_run, merged_run = run_through_times(spec, uniform), run_through_times(spec, merged_times)
+    indices = np.searchsorted(merged_times, uniform)
+    parts = zip(uniform_run, merged_run, strict=True)
+    largest_error = max(float(np.abs(a - b[indices]).max() / np.abs(a).max()) for a, b in parts)
     return Benchmark(
         f"{model}, default: difference between two grids", largest_error, "1", 1e-12, (Baseline("each other"),)
     )

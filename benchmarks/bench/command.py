@@ -17,7 +17,7 @@ def bench(terminal: Terminal) -> None:
     from . import study
     from .study import benchmark_table
 
-    selected = study.all_benchmarks()
-    with terminal.progress(len(selected)) as report:
-        benchmarks = study.run_benchmarks(selected, terminal.out, report)
+    functions = study.all_benchmarks()
+    with terminal.progress(len(functions)) as report:
+        benchmarks = study.run_benchmarks(functions, terminal.out, report)
     terminal.print_result(benchmarks, benchmark_table(benchmarks), folder=terminal.out / study.FOLDER)

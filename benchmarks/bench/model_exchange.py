@@ -27,7 +27,7 @@ from .benchmark import SETTINGS, Baseline, Benchmark
 from .native import (
     CASES_BY_NAME,
     RUN_TIME_TARGETS,
-    Measured,
+    Measurement,
     build_cvode_fmu,
     built_fmu,
     largest_error,
@@ -52,7 +52,7 @@ DRIVEN_SCENARIOS, LATE_SCENARIOS = (
     ]
     for start in (0.0, 1000.0)
 )
-TIE_SCENARIOS = [make_scenario(model, *its) for model, ties in SETTINGS["ties"].items() for its in ties.items()]
+TIE_SCENARIOS = [make_scenario(model, *tie) for model, ties in SETTINGS["ties"].items() for tie in ties.items()]
 COMPARED_SCENARIOS = [
     scene for scene in (*DEFAULT_SCENARIOS, *DRIVEN_SCENARIOS, *TIE_SCENARIOS) if not scene.has_ramps
 ]  # fmpy holds inputs in co-simulation
@@ -75,7 +75,7 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
     Both use BDF with a finite-difference Jacobian; the position of the driver is a state.
     """
 
-    def figures() -> Measured:
+    def figures() -> Measurement:
         ratio, baselines, missing = 0.0, [], set()
         for rtol in tolerances:
             errors = {
@@ -171,7 +171,7 @@ def difference_from_cosimulation(scene: Scenario) -> Benchmark:
     """Measure the largest relative difference between model exchange and co-simulation at the common times; infinite if
     the numbers of events differ."""
 
-    def figures() -> Measured:
+    def figures() -> Measurement:
         exchange_run, cosimulation_run = (run_fmpy(scene, 1e-10, exchange) for exchange in (True, False))
         counts = [
             int(recording.columns["events.count"][-1]) if scene.case.problem.has_dry_friction else 0
@@ -191,7 +191,7 @@ def call_overhead(model: str) -> Benchmark:
     The target is relative to BouncingBall with the acceleration of the model in C.
     """
 
-    def figures() -> Measured:
+    def figures() -> Measurement:
         library, equation = load_library(built_fmu(model, "native")), SETTINGS["acceleration"][model]
         root = ElementTree.parse(library.file.parents[2] / "modelDescription.xml").getroot()
         states = len(root.findall("ModelStructure/Derivatives/Unknown"))
@@ -232,9 +232,9 @@ def build_bouncing_ball(acceleration: str) -> Library:
     (guid,) = re.findall(r'INSTANTIATION_TOKEN "(.*)"', (model / "config.h").read_text(encoding="utf-8"))
     options = ("-std=gnu99", "-DFMI_VERSION=2", "-DDISABLE_PREFIX", f"-I{clone / 'include'}", f"-I{model}")
     others = (str(source / name) for name in ("fmi2Functions.c", "cosimulation.c"))
-    whole = (*options, f"-DACCELERATION={acceleration}", "-shared", "-fPIC", "-fvisibility=hidden", *others)
+    arguments = (*options, f"-DACCELERATION={acceleration}", "-shared", "-fPIC", "-fvisibility=hidden", *others)
     name = f"BouncingBall-{sha256(acceleration.encode()).hexdigest()[:8]}.so"
-    file = compile_source(Path(__file__).with_name("bouncing.c"), name, whole, ("-lm",))
+    file = compile_source(Path(__file__).with_name("bouncing.c"), name, arguments, ("-lm",))
     return Library(file, {"h": 1, "v": 3}, guid)
 
 

@@ -21,7 +21,7 @@ from ..c_host import Library, MissingToolError, compile_source, find_compiler, l
 from ..stepping_loops import COMMUNICATION_STEPS, time_direct_loop, time_per_step
 from .benchmark import SETTINGS, Baseline, Benchmark
 
-Measured = tuple[float, float, tuple[Baseline, ...]]  # value, target, baselines
+Measurement = tuple[float, float, tuple[Baseline, ...]]  # value, target, baselines
 
 CASES_BY_NAME = {case.name: case for case in CASES}
 
@@ -45,7 +45,7 @@ def native_benchmarks() -> list[Callable[[], Benchmark]]:
 def run_in_c(case: str) -> Benchmark:
     """Measure a run with 1600 points in the C host."""
 
-    def figures() -> Measured:
+    def figures() -> Measurement:
         try:
             peer = Baseline("FMU in Python", time_fmu(case, "python").seconds)
         except MissingToolError as error:
@@ -98,7 +98,7 @@ def compare_with_cvode(case: str) -> Benchmark:
     """
     method = "BDF" if CASES_BY_NAME[case].problem.is_stiff else "Adams"
 
-    def figures() -> Measured:
+    def figures() -> Measurement:
         timing, peers = time_fmu(case, "native"), [time_cvode(case, rtol) for rtol in TOLERANCES]
         error, errors = largest_error(case, timing), [largest_error(case, peer) for peer in peers]
         ratio = max(timing.seconds / min(peer.seconds for peer in peers), error / min(errors))
@@ -110,13 +110,13 @@ def compare_with_cvode(case: str) -> Benchmark:
     return measure_or_skip(f"{case}, native: larger of run time and error, ratio to the CVODE FMU", "1", figures)
 
 
-def compare_backends(seconds: Callable[[str], float]) -> Measured:
+def compare_backends(seconds: Callable[[str], float]) -> Measurement:
     """Compare the native FMU with the Python FMU, whose time is the target."""
     native, python = seconds("native"), seconds("python")
     return native, python, (Baseline("FMU in Python", python),)
 
 
-def measure_or_skip(title: str, unit: str, figures: Callable[[], Measured]) -> Benchmark:
+def measure_or_skip(title: str, unit: str, figures: Callable[[], Measurement]) -> Benchmark:
     """Run a measurement; if a tool is missing, return a benchmark with the reason."""
     try:
         value, target, baselines = figures()

@@ -73,10 +73,11 @@ class Scenario:
         """Return the reference position and speed (n, 2) at the common times."""
         if self.is_default:
             return self.case.reference.states
-        info, driven = read_info(self.case.model), [name for name in self.run.inputs if name != "time"]
+        info, input_names = read_info(self.case.model), [name for name in self.run.inputs if name != "time"]
         values = info.resolve_labels({**info.start_values, **self.run.values})
         spans = [
-            (t, end, {**values, **dict.fromkeys(driven, value), "rate": rate}) for t, end, value, rate in self.segments
+            (t, end, {**values, **dict.fromkeys(input_names, value), "rate": rate})
+            for t, end, value, rate in self.segments
         ]
         grid = CommunicationGrid(self.start, self.stop, POINTS - 1)
         return compute_reference(self.case.model, spans, grid).states

@@ -22,7 +22,7 @@ from harness.scenes.run_spec import RunSpec
 from ..c_host import Library, load_library
 from ..stepping_loops import COMMUNICATION_STEPS
 from .benchmark import SETTINGS, Baseline, Benchmark
-from .native import Measured, build_cvode_fmu, built_fmu, measure_or_skip, time_runs
+from .native import Measurement, build_cvode_fmu, built_fmu, measure_or_skip, time_runs
 
 RADAU9 = 6  # of solver.method
 SPEED_RATIOS = {float(error): ratio for error, ratio in SETTINGS["stiff"].items()}
@@ -69,10 +69,12 @@ def stiff_benchmarks() -> list[Callable[[], Benchmark]]:
 def compare_at_equal_error(name: str, error: float) -> Benchmark:
     """Measure the run time at an error; the target is a share of that of CVODE."""
 
-    def figures() -> Measured:
-        own, peer = time_at_error(run_fmu(name), error), min(time_at_error(runs, error) for runs in run_cvode(name))
-        target = peer / SPEED_RATIOS[error] if own < inf else nan  # missed if no run of radau9 reaches the error
-        return own, target, (Baseline("CVODE FMU, the fastest of BDF and Adams", peer),)
+    def figures() -> Measurement:
+        own_time = time_at_error(run_fmu(name), error)
+        peer_time = min(time_at_error(runs, error) for runs in run_cvode(name))
+        # missed if no run of radau9 reaches the error
+        target = peer_time / SPEED_RATIOS[error] if own_time < inf else nan
+        return own_time, target, (Baseline("CVODE FMU, the fastest of BDF and Adams", peer_time),)
 
     return measure_or_skip(f"{name}, native: radau9 at error {error:.0e}, C host", "s", figures)
 

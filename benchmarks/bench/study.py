@@ -64,8 +64,11 @@ def summarize_benchmarks(benchmarks: Iterable[Benchmark]) -> Summary:
     for benchmark in benchmarks:
         title = "Not measured" if isnan(benchmark.value) else "Targets that are met" if benchmark.is_met else ""
         groups[title].append(benchmark)
-    missed, met, _ = groups.values()
-    sentences = (f"{len(met)} of {len(met) + len(missed)} targets met.", *["Targets that are missed:"][: len(missed)])
+    missed_targets, met_targets, _ = groups.values()
+    sentences = (
+        f"{len(met_targets)} of {len(met_targets) + len(missed_targets)} targets met.",
+        *["Targets that are missed:"][: len(missed_targets)],
+    )
     headings = ("benchmark", "measured", "target", "unit", "baselines")
     tables = tuple(
         SummaryTable(headings, tuple(map(summary_row, rows)), title) for title, rows in groups.items() if rows
@@ -75,7 +78,7 @@ def summarize_benchmarks(benchmarks: Iterable[Benchmark]) -> Summary:
 
 def summary_row(benchmark: Benchmark) -> tuple[str, ...]:
     """Return the row of a benchmark, with two digits of what was measured."""
-    measured, target = (
+    value_text, target_text = (
         "" if isnan(value) else f"{value:{digits}}"
         for value, digits in ((benchmark.value, ".2g"), (benchmark.target, "g"))
     )
@@ -83,7 +86,7 @@ def summary_row(benchmark: Benchmark) -> tuple[str, ...]:
         baseline.name if baseline.value is None else f"{baseline.name} {baseline.value:.2g}"
         for baseline in benchmark.baselines
     )
-    return benchmark.name, measured, target, "" if benchmark.unit == "1" else benchmark.unit, baselines
+    return benchmark.name, value_text, target_text, "" if benchmark.unit == "1" else benchmark.unit, baselines
 
 
 FOLDER, FILE = "bench", "bench.csv"
@@ -107,12 +110,12 @@ def all_benchmarks() -> list[Callable[[], Benchmark]]:
 
 
 def run_benchmarks(
-    selected: list[Callable[[], Benchmark]], out: Path, report: Callable[[str, float], None]
+    functions: list[Callable[[], Benchmark]], out: Path, report: Callable[[str, float], None]
 ) -> list[Benchmark]:
     """Run benchmarks and write out/bench/bench.csv; `report` receives the name of each finished benchmark."""
     with replace_folder(out / FOLDER, (FILE,)) as folder:
         results = []
-        for run_benchmark in selected:
+        for run_benchmark in functions:
             results.append(run_benchmark())
             report(results[-1].name, 1.0)
         save(results, folder / FILE)

@@ -35,10 +35,10 @@ def run_campaign(name: str) -> tuple[int, float, str]:
     """Run a campaign; return its exit status, its processor time in s, and the last line of its output."""
     start = processor_time()
     with (FOLDER / f"{name}.txt").open("w+", encoding="utf-8") as output:
-        done = subprocess.run([sys.executable, *CAMPAIGNS[name]], stdout=output, stderr=subprocess.STDOUT)
+        process = subprocess.run([sys.executable, *CAMPAIGNS[name]], stdout=output, stderr=subprocess.STDOUT)
         output.seek(0)
         lines = output.read().split("\n")
-    return done.returncode, processor_time() - start, next(filter(None, map(str.strip, reversed(lines))), "")
+    return process.returncode, processor_time() - start, next(filter(None, map(str.strip, reversed(lines))), "")
 
 
 def main(names: list[str]) -> int:

@@ -15,7 +15,7 @@ import harness
 from harness.analyses.curve.law_fit import LAWS
 
 NAMES = ("F_c", "F_s", "v_s", "F_v", "bias")
-DRAWN = tuple(law for law in LAWS if law.name != "asymmetric-coulomb")  # which a bias replaces
+DRAWN_LAWS = tuple(law for law in LAWS if law.name != "asymmetric-coulomb")  # which a bias replaces
 PLATEAU, RAMP, REST = 400, 60, 20  # samples
 RATE = 500.0  # Hz
 
@@ -46,7 +46,7 @@ def friction(law, constants, v):
 def draw_record(number):
     """Return the law, the constants, the arguments of `identify_curve`, and whether the record is one over time."""
     rng = np.random.default_rng(number)
-    law = DRAWN[number % len(DRAWN)]
+    law = DRAWN_LAWS[number % len(DRAWN_LAWS)]
     v_max = 10 ** rng.uniform(-1, 0.5)
     speeds = np.geomspace(v_max * 10 ** rng.uniform(-3, -2.2), v_max, int(rng.integers(9, 20)))
     suffixes = ("",) if law.is_symmetric else ("+", "-")
@@ -78,10 +78,10 @@ def check_record(number):
     law, constants, arguments, is_over_time = draw_record(number)
     curve = harness.identify_curve(**arguments)
     fit = curve.find_law(law.name)
-    covered = {}
+    coverage = {}
     for estimate in fit.estimates if fit else ():
-        covered[estimate.name.rstrip("+-")] = estimate.low <= constants[estimate.name] <= estimate.high
-    return law.name, is_over_time, curve.best.name, covered, int((~curve.used).sum())
+        coverage[estimate.name.rstrip("+-")] = estimate.low <= constants[estimate.name] <= estimate.high
+    return law.name, is_over_time, curve.best.name, coverage, int((~curve.used).sum())
 
 
 def table_lines(rows):
@@ -95,9 +95,9 @@ def table_lines(rows):
     for name, group in groups.items():
         shares = [[row[3][key] for row in group if key in row[3]] for key in NAMES]
         cells = [f"{np.mean(share):6.3f}" if share else " " * 6 for share in shares]
-        chosen = np.mean([row[0] == row[2] for row in group])
+        chosen_share = np.mean([row[0] == row[2] for row in group])
         total = np.mean([value for share in shares for value in share])
-        yield f"{name:22} {len(group):7} {chosen:7.3f} {' '.join(cells)} {total:6.3f}"
+        yield f"{name:22} {len(group):7} {chosen_share:7.3f} {' '.join(cells)} {total:6.3f}"
     points = sum(row[4] for row in rows)
     yield f"{points} points of {len(rows)} records were left out as points that do not fit, though none was drawn."
 

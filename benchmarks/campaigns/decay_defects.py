@@ -71,10 +71,10 @@ def check_record(task):
         fit = identify(record, pendulum=sine)
     except HarnessError as refusal:
         return number, defect, None, 0.0, str(refusal)
-    by_name = {one.name: one for one in fit.estimates}
-    contained = [by_name[name].low <= true_values[name] <= by_name[name].high for name in NAMES]
+    by_name = {estimate.name: estimate for estimate in fit.estimates}
+    coverage = [by_name[name].low <= true_values[name] <= by_name[name].high for name in NAMES]
     far = max(abs(by_name[name].value - true_values[name]) / by_name[name].error for name in NAMES)
-    return number, defect, contained, far, " ".join(fit.remarks)
+    return number, defect, coverage, far, " ".join(fit.remarks)
 
 
 def table_lines(rows):
@@ -84,16 +84,16 @@ def table_lines(rows):
     )
     for defect in (*DEFECTS, "all"):
         group = [row for row in rows if defect in ("all", row[1])]
-        contained = [row[2] for row in group if row[2] is not None]
-        shares = np.mean(contained, axis=0) if contained else np.full(len(NAMES), np.nan)
+        coverage = [row[2] for row in group if row[2] is not None]
+        shares = np.mean(coverage, axis=0) if coverage else np.full(len(NAMES), np.nan)
         silent = sum(row[2] is not None and row[3] > FAR and not row[4] for row in group)
         yield (
-            f"{defect:12} {len(contained):7} {len(group) - len(contained):7} "
+            f"{defect:12} {len(coverage):7} {len(group) - len(coverage):7} "
             + " ".join(f"{share:6.3f}" for share in (*shares, shares.mean()))
             + f" {silent:7}"
         )
-    for number, defect, contained, far, text in rows:
-        if contained is None:
+    for number, defect, coverage, far, text in rows:
+        if coverage is None:
             yield f"record {number} ({defect}) refused: {text}"
         elif far > FAR:
             yield f"record {number} ({defect}) off by {far:.1f} errors: {text or 'no remark'}"
@@ -108,5 +108,5 @@ if __name__ == "__main__":
         for row in pool.map(check_record, tasks, chunksize=4):
             rows.append(row)
     print(*table_lines(rows), sep="\n")
-    fitted = [row for row in rows if row[2] is not None and row[1] != "loss"]
-    sys.exit(any(far > FAR and not remarks for _, _, _, far, remarks in fitted))
+    fitted_rows = [row for row in rows if row[2] is not None and row[1] != "loss"]
+    sys.exit(any(far > FAR and not remarks for _, _, _, far, remarks in fitted_rows))

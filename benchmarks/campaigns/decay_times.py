@@ -38,10 +38,10 @@ if __name__ == "__main__":
     print(f"{'samples':>9} {'now':>7} {'without averaging':>18}")
     for samples in (10**k for k in range(3, 7) if 10**k <= largest):
         record = experiment(samples)
-        averaged, unaveraged = [], []
+        averaged_times, unaveraged_times = [], []
         for _ in range(2):
-            averaged.append(processor_time(record, thresholds.MAX_DENSE_SAMPLES))
+            averaged_times.append(processor_time(record, thresholds.MAX_DENSE_SAMPLES))
             if samples <= MOST_UNTHINNED:
-                unaveraged.append(processor_time(record, samples))
-        now, before = (f"{min(times):.1f} s" if times else "-" for times in (averaged, unaveraged))
+                unaveraged_times.append(processor_time(record, samples))
+        now, before = (f"{min(times):.1f} s" if times else "-" for times in (averaged_times, unaveraged_times))
         print(f"{samples:9} {now:>7} {before:>18}", flush=True)

@@ -44,7 +44,7 @@ class DrawnRecord:
     truth: dict[str, float]
     free: dict[str, tuple[float, float] | None]
     noise: str
-    fixed: dict[str, float] = field(default_factory=dict)
+    fixed_values: dict[str, float] = field(default_factory=dict)
     inputs: dict[str, np.ndarray] = field(default_factory=dict)
 
 
@@ -67,25 +67,25 @@ def draw_record(group, simulator, random, max_samples=20_000):
     for static, sliding in LARGER.items():
         if sliding in truth:
             truth[sliding] = truth[static] * random.uniform(0.3, 0.95)
-    fixed, inputs, driven = {}, {}, {}
+    fixed_values, inputs, run_inputs = {}, {}, {}
     if "x0" in names:
         reach = truth["mu_s"] * start["m"] * start["g"] / truth["k"]
         truth["x0"], free["x0"] = random.uniform(-1, 1) * reach, (-0.5, 0.5)
     if "theta0" in names:
         truth["theta0"], free["theta0"] = random.uniform(0.05, 1.5), (-2.0, 2.0)
     if group.model == "coulomb":
-        truth["c"], free["c"], fixed["x0"] = random.uniform(0, 3), (0.0, 10.0), 0.0
+        truth["c"], free["c"], fixed_values["x0"] = random.uniform(0, 3), (0.0, 10.0), 0.0
         force = draw_force(truth["f"], random)
         inputs["F_ext"] = force(t)
         parts = -(-FINE_POINTS // len(t))
         fine = np.append((t[:-1, None] + np.diff(t)[:, None] * np.arange(parts) / parts).ravel(), t[-1])
-        driven = {"time": fine, "F_ext": force(fine)}
-    run = replace(simulator.spec, outputs=group.outputs, times=t, inputs=driven, follow=False)
-    clean = simulator.prepare(run)(truth | fixed)
+        run_inputs = {"time": fine, "F_ext": force(fine)}
+    run = replace(simulator.spec, outputs=group.outputs, times=t, inputs=run_inputs, follow=False)
+    clean = simulator.prepare(run)(truth | fixed_values)
     y, noise = add_noise(clean, random)
     if group.record_of:
         truth = {"k": truth["k"], "mu_s": truth["f_s"] / (start["m"] * 9.81), "v_driver": start["v_driver"]}
-    return DrawnRecord(t, y, truth, free, f"{noise}, n = {len(t)}", fixed, inputs)
+    return DrawnRecord(t, y, truth, free, f"{noise}, n = {len(t)}", fixed_values, inputs)
 
 
 def factor(random):

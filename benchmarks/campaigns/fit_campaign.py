@@ -43,9 +43,9 @@ def build_fmus(folder):
     """Build the native FMUs of all groups for this platform and return the folder."""
     models = sorted({group.model for group in GROUPS.values()})
     sources = [str(SOURCES.get(model, model)) for model in models]
-    done = run_module("build_fmus", *sources, "--native", "--platform", "linux64", "--out", str(folder))
-    if done.returncode:
-        raise RuntimeError(done.stderr)
+    process = run_module("build_fmus", *sources, "--native", "--platform", "linux64", "--out", str(folder))
+    if process.returncode:
+        raise RuntimeError(process.stderr)
     return folder
 
 
@@ -63,7 +63,7 @@ def fit_drawn_record(group, seed, fmus):
     table = Table("record", ("t [s]", *columns), (record.t, *columns.values()))
     observe, inputs = {name: name for name in group.outputs}, {name: name for name in record.inputs}
     fmu = fmus / f"{group.model}.fmu"
-    run = RunSpec(fmu, values=record.fixed, timeout=10.0)
+    run = RunSpec(fmu, values=record.fixed_values, timeout=10.0)
     request = FitRequest(run, record.free, observe, inputs)
     task = make_task(request)
     try:
@@ -120,16 +120,16 @@ def print_summary(rows):
     for name, part in lines:
         if not part:
             continue
-        fitted = [row for row in part if "refused" not in row]
-        partly = [row for row in fitted if not all(map(isfinite, row["errors"].values()))]
-        found = [row for row in fitted if is_found(row)]
-        silent = [row for row in fitted if not is_found(row) and not row["remarks"]]
-        remarked = [row for row in fitted if row["remarks"]]
-        inputs = [row for row in remarked if any(remark.startswith("The inputs") for remark in row["remarks"])]
+        fits = [row for row in part if "refused" not in row]
+        partly = [row for row in fits if not all(map(isfinite, row["errors"].values()))]
+        found_rows = [row for row in fits if is_found(row)]
+        silent = [row for row in fits if not is_found(row) and not row["remarks"]]
+        remarked_rows = [row for row in fits if row["remarks"]]
+        inputs = [row for row in remarked_rows if any(remark.startswith("The inputs") for remark in row["remarks"])]
         seconds = [row["seconds"] for row in part]
         print(
-            f"{name:23}{len(part):7} {len(part) - len(fitted):7} {len(partly):6} {len(found):4}/{len(fitted):<4}"
-            f"{len(silent):6} {len(remarked):8} {len(inputs):6} {coverage(fitted):23}{np.median(seconds):7.2f} "
+            f"{name:23}{len(part):7} {len(part) - len(fits):7} {len(partly):6} {len(found_rows):4}/{len(fits):<4}"
+            f"{len(silent):6} {len(remarked_rows):8} {len(inputs):6} {coverage(fits):23}{np.median(seconds):7.2f} "
             f"{max(seconds):7.2f}"
         )
 
@@ -137,11 +137,11 @@ def print_summary(rows):
 def coverage(rows):
     """Return the share of intervals that hold the truth; its standard error is that of a ratio of sums over records."""
     counts = np.array([len(row["covered"]) for row in rows])
-    held = np.array([sum(row["covered"].values()) for row in rows])
+    held_counts = np.array([sum(row["covered"].values()) for row in rows])
     if not counts.sum():
         return ""
-    share = held.sum() / counts.sum()
-    error = np.sqrt(np.sum((held - share * counts) ** 2)) / counts.sum()
+    share = held_counts.sum() / counts.sum()
+    error = np.sqrt(np.sum((held_counts - share * counts) ** 2)) / counts.sum()
     return f"{100 * share:5.1f} +- {100 * error:3.1f} % of {counts.sum():4}"
 
 
@@ -162,24 +162,26 @@ def main():
     groups = arguments.group or [*GROUPS]
     with temporary_directory("campaign-") as folder:
         fmus = arguments.fmus or build_fmus(folder)
-        done = {(row["group"], row["seed"]) for row in rows}
+        finished_records = {(row["group"], row["seed"]) for row in rows}
         for n in range(arguments.records):
             name, number = groups[n % len(groups)], n // len(groups)
             seed = [arguments.seed, [*GROUPS].index(name), number]
-            if (name, str(seed)) in done:
+            if (name, str(seed)) in finished_records:
                 continue
             start = cpu_seconds()
             record, fit = fit_drawn_record(GROUPS[name], seed, fmus)
             row = summarize(record, fit, cpu_seconds() - start)
             rows.append({"group": name, "seed": str(seed)} | row)
             bad = "" if "refused" in row or is_found(row) else "NOT FOUND"
-            missed = [parameter for parameter, held in row.get("covered", {}).items() if not held]
-            print(name, number, row["noise"], f"{row['seconds']:.1f} s", bad, missed or "", flush=True)
+            missed_parameters = [
+                parameter for parameter, is_covered in row.get("covered", {}).items() if not is_covered
+            ]
+            print(name, number, row["noise"], f"{row['seconds']:.1f} s", bad, missed_parameters or "", flush=True)
             if arguments.log:
                 arguments.log.write_text(json.dumps(rows))
     print_summary(rows)
-    fitted = [row for row in rows if row["group"] != "wrong law" and "refused" not in row]
-    sys.exit(any(not is_found(row) and not row["remarks"] for row in fitted))
+    fitted_rows = [row for row in rows if row["group"] != "wrong law" and "refused" not in row]
+    sys.exit(any(not is_found(row) and not row["remarks"] for row in fitted_rows))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import sys
 import tempfile
 
 
-def fit_with_modestpy(t, x, free, known, force, fmu):
+def fit_with_modestpy(t, x, free, known_values, force, fmu):
     """Fit by a genetic algorithm and pattern search."""
     import pandas
     from fmpy.fmi1 import FMICallException
@@ -29,17 +29,17 @@ def fit_with_modestpy(t, x, free, known, force, fmu):
 
     Model.simulate = simulate_or_reset
     inputs = pandas.DataFrame({"F_ext": 0.0 if force is None else force}, index=index)
-    measured = pandas.DataFrame({"x": x}, index=index)
+    positions = pandas.DataFrame({"x": x}, index=index)
     one_process = {"workers": 1}
-    estimation = Estimation(os.getcwd(), fmu, inputs, known, free, measured, modestga_opts=one_process)
+    estimation = Estimation(os.getcwd(), fmu, inputs, known_values, free, positions, modestga_opts=one_process)
     return estimation.estimate()
 
 
 if __name__ == "__main__":
-    given = json.load(sys.stdin)
+    arguments = json.load(sys.stdin)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)  # ModestPy writes there
-        values = fit_with_modestpy(**given)
+        values = fit_with_modestpy(**arguments)
         os.chdir("/")
     print()
     print(json.dumps({name: float(value) for name, value in values.items()}))

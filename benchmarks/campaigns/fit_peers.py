@@ -67,10 +67,12 @@ def coulomb_rates(t, y, m, k, f, c, times, force):
     return [v, (np.interp(t, times, force) - k * x - c * v - f * tanh(v / 1e-3)) / m]
 
 
-def smoothed_run(t, free, known, force):
+def smoothed_run(t, free, known_values, force):
     """Return the positions at the times."""
-    rates, start = (stickslip_rates, [0.0, 0.0]) if force is None else (coulomb_rates, [known.get("x0", 0.0), 0.0])
-    values = {name: value for name, value in {**known, **free}.items() if name != "x0"}
+    rates, start = (
+        (stickslip_rates, [0.0, 0.0]) if force is None else (coulomb_rates, [known_values.get("x0", 0.0), 0.0])
+    )
+    values = {name: value for name, value in {**known_values, **free}.items() if name != "x0"}
     extra = {} if force is None else {"times": t, "force": force}
     run = solve_ivp(
         lambda t, y: rates(t, y, **values, **extra), t[[0, -1]], start, "LSODA", t, rtol=1e-6, atol=1e-9, max_step=0.05
@@ -78,33 +80,33 @@ def smoothed_run(t, free, known, force):
     return run.y[0] if run.y.shape[1] == len(t) else np.full(len(t), 1e6)
 
 
-def fit_with_lmfit(t, x, free, known, force):
+def fit_with_lmfit(t, x, free, known_values, force):
     """Fit by least squares from the start values."""
     import lmfit
 
     parameters = lmfit.Parameters()
     for name, (start, low, high) in free.items():
         parameters.add(name, value=start, min=low, max=high)
-    result = lmfit.minimize(lambda p: smoothed_run(t, p.valuesdict(), known, force) - x, parameters)
+    result = lmfit.minimize(lambda p: smoothed_run(t, p.valuesdict(), known_values, force) - x, parameters)
     return result.params.valuesdict()
 
 
-def fit_with_scipy(t, x, free, known, force):
+def fit_with_scipy(t, x, free, known_values, force):
     """Fit by differential evolution in the ranges."""
 
     def squares(values):
-        return np.sum((smoothed_run(t, dict(zip(free, values, strict=True)), known, force) - x) ** 2)
+        return np.sum((smoothed_run(t, dict(zip(free, values, strict=True)), known_values, force) - x) ** 2)
 
     bounds = [(low, high) for _, low, high in free.values()]
     result = differential_evolution(squares, bounds, seed=1)
     return dict(zip(free, result.x, strict=True))
 
 
-def fit_with_harness(t, x, free, known, force, fmu):
+def fit_with_harness(t, x, free, known_values, force, fmu):
     """Fit in the ranges."""
     frame = pandas.DataFrame({"t": t, "x": x, "F_ext": 0.0 if force is None else force})
     ranges = {name: (low, high) for name, (_, low, high) in free.items()}
-    return harness.fit(fmu, frame, ranges, observe="x", inputs=[] if force is None else ["F_ext"], values=known)
+    return harness.fit(fmu, frame, ranges, observe="x", inputs=[] if force is None else ["F_ext"], values=known_values)
 
 
 # ---- the comparison
@@ -130,18 +132,18 @@ class Attempt:
     is_found: bool = False
 
 
-def run_modestpy(python, t, x, free, known, force, fmu):
+def run_modestpy(python, t, x, free, known_values, force, fmu):
     """Fit with ModestPy in the environment of an interpreter."""
     record = {"t": t.tolist(), "x": x.tolist(), "force": None if force is None else force.tolist()}
-    request = json.dumps(record | {"free": free, "known": known, "fmu": str(fmu)})
-    done = subprocess.run(
+    request = json.dumps(record | {"free": free, "known_values": known_values, "fmu": str(fmu)})
+    process = subprocess.run(
         [python, "-W", "ignore", fit_modestpy.__file__], input=request, capture_output=True, text=True
     )
-    if done.returncode == -signal.SIGXCPU:
+    if process.returncode == -signal.SIGXCPU:
         raise TimeoutError("stopped")
-    if done.returncode:
-        raise RuntimeError((done.stderr.strip() or "no message").splitlines()[-1])
-    return json.loads(done.stdout.splitlines()[-1])
+    if process.returncode:
+        raise RuntimeError((process.stderr.strip() or "no message").splitlines()[-1])
+    return json.loads(process.stdout.splitlines()[-1])
 
 
 MODELS = (smoothed_run, stickslip_rates, coulomb_rates)
@@ -169,8 +171,8 @@ def version_of(package, python):
         except PackageNotFoundError:
             return None
     code = f"from importlib.metadata import version; print(version({package!r}))"
-    done = subprocess.run([python, "-c", code], capture_output=True, text=True)
-    return None if done.returncode else done.stdout.strip()
+    process = subprocess.run([python, "-c", code], capture_output=True, text=True)
+    return None if process.returncode else process.stdout.strip()
 
 
 def draw_even_record(name, number, fmus):
@@ -233,15 +235,15 @@ def fit_record(number, fmus, peers, least_budget=LEAST_BUDGET):
     free |= {key: (sum(ends) / 2, *ends) for key, ends in record.free.items() if ends and key not in free}
     force, x = record.inputs.get("F_ext"), record.y[:, 0]
     begin = cpu_seconds()
-    fit = fit_with_harness(record.t, x, free, record.fixed, force, fmu)
+    fit = fit_with_harness(record.t, x, free, record.fixed_values, force, fmu)
     seconds = cpu_seconds() - begin
     attempts = {"harness.fit": Attempt(fit.values, "", seconds, is_found(fit.values, fit, record.truth))}
     for tool, peer in peers.items():
-        known = dict(record.fixed)
+        known_values = dict(record.fixed_values)
         if not peer.runs_fmu:
             names = ("m", "k", "mu_s", "mu_d", "v_driver") if force is None else ("m", "k", "f", "c")
-            known |= {key: start[key] for key in names if key not in free}
-        arguments = (record.t, x, free, known, force, *((fmu,) if peer.runs_fmu else ()))
+            known_values |= {key: start[key] for key in names if key not in free}
+        arguments = (record.t, x, free, known_values, force, *((fmu,) if peer.runs_fmu else ()))
         attempt = call_peer(peer.fit, arguments, max(least_budget, BUDGET * seconds))
         is_right = not attempt.failure and is_found(attempt.values, fit, record.truth)
         attempts[tool] = Attempt(attempt.values, attempt.failure, attempt.seconds, is_right)
@@ -255,13 +257,13 @@ def print_table(attempts, lines, versions):
     for tool in attempts[0]:
         tries = [record_attempts[tool] for record_attempts in attempts]
         failures = [attempt.failure for attempt in tries if attempt.failure not in ("", "stopped")]
-        stopped, median = (
+        n_stopped, median = (
             sum(attempt.failure == "stopped" for attempt in tries),
             float(np.median([attempt.seconds for attempt in tries])),
         )
         n_found = f"{sum(attempt.is_found for attempt in tries)}/{len(tries)}"
         print(
-            f"{tool:14}{versions[tool]:10}{n_found:>8}{stopped:9}{len(failures):8}{median:10.1f}"
+            f"{tool:14}{versions[tool]:10}{n_found:>8}{n_stopped:9}{len(failures):8}{median:10.1f}"
             f"{median / own_seconds:8.1f}{lines[tool]:7}"
         )
         for failure in dict.fromkeys(failures):

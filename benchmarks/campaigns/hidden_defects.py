@@ -58,7 +58,7 @@ def curve_record(rng, kind):
     is_sweep = kind in ("lag", "presliding") or (kind not in ("offset", "code") and rng.random() < 0.5)
     t, v = (sweep if is_sweep else stairs)(rng)
     force, share = friction(v, truth), rng.uniform(0.1, 0.3) * rng.choice([-1, 1])
-    measured, ranges = v, {name: [value] for name, value in truth.items()}
+    measured_speed, ranges = v, {name: [value] for name, value in truth.items()}
     if kind in ("drift", "viscous drift"):
         change = share * t / t[-1]
         part = np.sign(v) * abs(truth["F_c"]) if kind == "drift" else truth["F_v"] * v
@@ -72,14 +72,14 @@ def curve_record(rng, kind):
         x, distance = np.cumsum(v) / RATE, rng.uniform(2e-4, 1e-3)
         force = preslide(x, v, force, distance)
     elif kind == "offset":
-        measured = v + rng.uniform(0.01, 0.03) * rng.choice([-1, 1])
+        measured_speed = v + rng.uniform(0.01, 0.03) * rng.choice([-1, 1])
     elif kind == "code":
         step = rng.uniform(0.005, 0.015)
-        measured = (np.floor(v / step) + 0.5) * step
-    held = (v == 0) * np.repeat(rng.uniform(-1, 1, len(v) // 40 + 1), 40)[: len(v)]  # force at rest, by the drive
-    force = force + held * truth["F_c"] * (kind in ("offset", "code")) + 0.05 * rng.standard_normal(len(v))
+        measured_speed = (np.floor(v / step) + 0.5) * step
+    rest_force = (v == 0) * np.repeat(rng.uniform(-1, 1, len(v) // 40 + 1), 40)[: len(v)]  # force at rest, by the drive
+    force = force + rest_force * truth["F_c"] * (kind in ("offset", "code")) + 0.05 * rng.standard_normal(len(v))
     noise = 0.0 if kind == "code" else 1e-4
-    record = {"t [s]": t, "v [m/s]": measured + noise * rng.standard_normal(len(v)), "F [N]": force}
+    record = {"t [s]": t, "v [m/s]": measured_speed + noise * rng.standard_normal(len(v)), "F [N]": force}
     return record, ranges
 
 
@@ -172,28 +172,28 @@ def check_record(task):
         estimates, ranges, remarks = KINDS[kind](np.random.default_rng((number, len(kind))), kind)
     except HarnessError as refusal:
         return kind, number, None, [], str(refusal)
-    held, far = [], []
+    coverage, far = [], []
     for estimate in estimates:
         name = estimate.name.rstrip("+-")
         if name not in ranges or not estimate.low <= estimate.high or np.isnan(ranges[name]).any():  # or no interval
             continue
         low, high = min(ranges[name]), max(ranges[name])
-        held.append(estimate.low <= high and low <= estimate.high)
+        coverage.append(estimate.low <= high and low <= estimate.high)
         if max(estimate.low - high, low - estimate.high) > (estimate.high - estimate.low) / 2:
             far.append(f"{estimate.name} {estimate.value:.4g} [{estimate.low:.4g}, {estimate.high:.4g}] for {low:.4g}")
-    return kind, number, held, far, " ".join(remarks)
+    return kind, number, coverage, far, " ".join(remarks)
 
 
 def table_lines(rows):
     yield f"{'kind':14} {'records':>7} {'refused':>7} {'hold':>7} {'far':>5} {'silent':>7} {'remark':>7}"
     for kind in dict.fromkeys(row[0] for row in rows):
         group = [row for row in rows if row[0] == kind]
-        held = [value for row in group for value in row[2] or ()]
+        coverage = [value for row in group for value in row[2] or ()]
         silent = sum(bool(row[3]) and not row[4] for row in group)
         far, remark = sum(bool(row[3]) for row in group), sum(row[2] is not None and bool(row[4]) for row in group)
-        refused = sum(row[2] is None for row in group)
-        share = np.mean(held) if held else np.nan
-        yield f"{kind:14} {len(group):7} {refused:7} {share:7.3f} {far:5} {silent:7} {remark:7}"
+        n_refused = sum(row[2] is None for row in group)
+        share = np.mean(coverage) if coverage else np.nan
+        yield f"{kind:14} {len(group):7} {n_refused:7} {share:7.3f} {far:5} {silent:7} {remark:7}"
     for kind, number, _, far, remarks in rows:
         if far:
             yield f"{kind} {number}: {', '.join(far)}: {remarks or 'NO REMARK'}"

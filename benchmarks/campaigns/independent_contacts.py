@@ -52,7 +52,7 @@ class Spring:
 class Contact:
     """Contact with the slip `row` v - belt - belt_1 sin(angle).
 
-    load = load_0 + load_1 sin(angle) + load_t t + load_q q, at least 0 if it is `limited`
+    load = load_0 + load_1 sin(angle) + load_t t + load_q q, at least 0 if it `is_limited`
     slide = load (mu_d + (mu_p - mu_d) exp(-(slip/v_s)^2)),   hold = load mu_s
     """
 
@@ -64,7 +64,7 @@ class Contact:
     load_1: float = 0.0
     load_t: float = 0.0
     load_q: tuple[float, ...] = ()
-    limited: bool = False
+    is_limited: bool = False
     v_s: float = 1.0
     belt: float = 0.0
     belt_1: float = 0.0
@@ -166,7 +166,7 @@ class Solution:
 
     def decided_until(self, bound):
         """Return the time of the first decision with a margin below `bound`, and that decision."""
-        near = [one for one in self.decisions if one.margin < bound]
+        near = [decision for decision in self.decisions if decision.margin < bound]
         return (near[0].t, near[0]) if near else (inf, None)
 
 
@@ -204,7 +204,7 @@ class _Run:
         self.has_curve = bool(np.any(self.mu_p != self.mu_d))
         self.t, self.q, self.v = 0.0, np.array(system.q_0, float), np.array(system.v_0, float)
         self.modes = [0] * len(system.contacts)
-        self.pressed = np.ones(len(system.contacts))  # 0 where a limited load is zero
+        self.is_pressed = np.ones(len(system.contacts))  # 0 where a limited load is zero
         self.largest_slip = np.full(len(system.contacts), MIN_SPEED)
         self.largest_hold = np.full(len(system.contacts), 1e-12)
         stiffness = sum(self.k) + 3.0 * sum(self.h) * max(np.abs(self.q).max(), 0.1) ** 2
@@ -225,10 +225,10 @@ class _Run:
         e, square = np.zeros((2, order + 1, len(s.springs)))
         q[0], v[0] = self.q, self.v
         modes = np.array(modes)
-        direction = modes * self.pressed
-        stuck = np.flatnonzero(modes == 0)
-        held = self.rows[stuck]
-        response = np.linalg.inv(held * self.inverse_masses @ held.T) if len(stuck) else None
+        direction = modes * self.is_pressed
+        stuck_contacts = np.flatnonzero(modes == 0)
+        held_rows = self.rows[stuck_contacts]
+        response = np.linalg.inv(held_rows * self.inverse_masses @ held_rows.T) if len(stuck_contacts) else None
         for k in range(order + 1):
             e[k] = self.spring_rows @ q[k]
             spring = self.c * (self.spring_rows @ v[k])
@@ -241,11 +241,11 @@ class _Run:
             if self.has_cubic:
                 square[k] = convolve(e[: k + 1], e[k::-1])
                 spring += self.h * convolve(square[: k + 1], e[k::-1])
-            applied = self.force_1 * sines[k] - self.spring_rows.T @ spring
+            applied_force = self.force_1 * sines[k] - self.spring_rows.T @ spring
             slip[k] = self.rows @ v[k] - self.belt_1 * sines[k]
             load[k] = self.load_q @ q[k] + self.load_1 * sines[k]
             if k == 0:
-                applied += self.force_0
+                applied_force += self.force_0
                 slip[k] -= self.belt
                 load[k] += self.load_0 + self.load_t * self.t
             elif k == 1:
@@ -260,13 +260,13 @@ class _Run:
                     curve[k] = convolve(ORDERS[1 : k + 1] * u[1 : k + 1], curve[k - 1 :: -1]) / k
                 slide[k] += (self.mu_p - self.mu_d) * convolve(load[: k + 1], curve[k::-1])
             force[k] = direction * slide[k]
-            if len(stuck):
-                free = self.inverse_masses * (applied - self.rows.T @ force[k])
-                belt_rate = self.belt_1[stuck] * sines[k + 1] * (k + 1)
-                force[k, stuck] = response @ (held @ free - belt_rate)
-            v[k + 1] = self.inverse_masses * (applied - self.rows.T @ force[k]) / (k + 1)
+            if len(stuck_contacts):
+                free = self.inverse_masses * (applied_force - self.rows.T @ force[k])
+                belt_rate = self.belt_1[stuck_contacts] * sines[k + 1] * (k + 1)
+                force[k, stuck_contacts] = response @ (held_rows @ free - belt_rate)
+            v[k + 1] = self.inverse_masses * (applied_force - self.rows.T @ force[k]) / (k + 1)
             q[k + 1] = v[k] / (k + 1)
-        hold, slide = self.mu_s * load * self.pressed, slide * self.pressed
+        hold, slide = self.mu_s * load * self.is_pressed, slide * self.is_pressed
         self.force_scale = max(np.abs(applied_scale(self, slide)), 1e-12)
         return Series(self.t, tuple(int(m) for m in modes), q, v, slip, force, hold, load)
 
@@ -339,7 +339,7 @@ class _Run:
 
     def is_free(self, i):
         """Return whether a contact has neither friction nor events at present."""
-        return not self.system.reversals_are_events and (self.mu_s[i] == 0.0 or not self.pressed[i])
+        return not self.system.reversals_are_events and (self.mu_s[i] == 0.0 or not self.is_pressed[i])
 
     def advance(self, series, t):
         self.q, self.v = series.state(t)
@@ -359,8 +359,8 @@ class _Run:
                 result.append(_Guard(i, "hold", series.hold[:, i] - series.force[:, i], scale))
                 result.append(_Guard(i, "hold", series.hold[:, i] + series.force[:, i], scale))
             contact = self.system.contacts[i]
-            sign = 1.0 if self.pressed[i] else -1.0
-            if contact.limited:
+            sign = 1.0 if self.is_pressed[i] else -1.0
+            if contact.is_limited:
                 result.append(_Guard(i, "load", sign * series.load[:, i], max(contact.load_0, contact.load_1)))
             elif series.load[0, i] < -TIE * self.force_scale:
                 raise UnsolvableError(f"the load of contact {i} is negative at {self.t}")
@@ -384,12 +384,12 @@ class _Run:
 
     def relate_margins(self):
         """Relate all margins to the largest slip or limit of the run."""
-        for one in self.solution.decisions:
-            if isinstance(one.margin, tuple):
-                value, kind = one.margin
+        for decision in self.solution.decisions:
+            if isinstance(decision.margin, tuple):
+                value, kind = decision.margin
                 scales = {"slip": self.largest_slip, "hold": self.largest_hold}[kind]
-                one.margin = float(value / scales[one.contact])
-        self.solution.decisions.sort(key=lambda one: one.t)
+                decision.margin = float(value / scales[decision.contact])
+        self.solution.decisions.sort(key=lambda decision: decision.t)
 
     def note_dips(self, guards, values, slopes, h, end):
         """Record the depth of minima of guards before the event."""
@@ -453,19 +453,25 @@ class _Run:
             for i, mode in zip(rest, trial, strict=True):
                 modes[i] = mode
             verdicts = self.judge(modes, rest)
-            held = sum(mode == 0 for mode in trial)
+            n_held = sum(mode == 0 for mode in trial)
             n_below_limit = sum(modes[i] == 0 for i in below_limit)
-            trials.append((held, n_below_limit, modes, verdicts))
-        good = [one for one in trials if all(ok for ok, _ in one[3])]
+            trials.append((n_held, n_below_limit, modes, verdicts))
+        good = [candidate for candidate in trials if all(ok for ok, _ in candidate[3])]
         if not good:
             raise UnsolvableError(f"no consistent modes at {self.t}")
-        held, n_below_limit, modes, verdicts = max(good, key=lambda one: one[:2])
-        best = [one for one in good if one[0] == held and (one[1] == n_below_limit or arriving)]
+        n_held, n_below_limit, modes, verdicts = max(good, key=lambda candidate: candidate[:2])
+        best = [
+            candidate for candidate in good if candidate[0] == n_held and (candidate[1] == n_below_limit or arriving)
+        ]
         if len(best) > 1:
             self.solution.decisions.append(Decision(self.t, "choice", -1, 0.0))
         margin = min((size for _, size in verdicts), default=inf)
-        for other_held, other_kept, _, others in trials:
-            if other_held >= held and (other_kept >= n_below_limit or arriving) and not all(ok for ok, _ in others):
+        for other_n_held, other_n_below_limit, _, others in trials:
+            if (
+                other_n_held >= n_held
+                and (other_n_below_limit >= n_below_limit or arriving)
+                and not all(ok for ok, _ in others)
+            ):
                 margin = min(margin, max(size for ok, size in others if not ok))
         if margin < 0.05:
             self.solution.decisions.append(Decision(self.t, "modes", -1, float(margin)))
@@ -487,9 +493,9 @@ class _Run:
         load = self.load_0 + self.load_1 * sin(angle) + self.load_t * self.t + self.load_q @ self.q
         rate = self.load_1 * s.omega * cos(angle) + self.load_t + self.load_q @ self.v
         for i, contact in enumerate(s.contacts):
-            if contact.limited:
+            if contact.is_limited:
                 at_zero = abs(load[i]) <= TIE * max(contact.load_0, contact.load_1)
-                self.pressed[i] = float(rate[i] > 0.0 if at_zero else load[i] > 0.0)
+                self.is_pressed[i] = float(rate[i] > 0.0 if at_zero else load[i] > 0.0)
 
     def judge(self, modes, rest):
         """Return for each contact at rest whether its mode is consistent, and by what margin."""
@@ -530,9 +536,9 @@ def applied_scale(run, slide):
     )
 
 
-def leading(weighted):
+def leading(coefficients):
     """Return the first coefficient that is not a rounding error, or 0."""
-    for c in weighted:
+    for c in coefficients:
         if abs(c) > TIE:
             return c
     return 0.0
@@ -547,8 +553,8 @@ class _Guard:
 
     def skip_zeros(self, time_scale):
         """Divide by the power of the time with which the guard starts; a guard that is zero throughout is dropped."""
-        weighted = self.coefficients * time_scale ** np.arange(len(self.coefficients)) / self.scale
-        order = next((k for k, c in enumerate(weighted[: DECISION_ORDER + 1]) if abs(c) > TIE), None)
+        weighted_coefficients = self.coefficients * time_scale ** np.arange(len(self.coefficients)) / self.scale
+        order = next((k for k, c in enumerate(weighted_coefficients[: DECISION_ORDER + 1]) if abs(c) > TIE), None)
         if order is None:
             self.coefficients = None
         elif order:

@@ -27,13 +27,13 @@ CASES = POSITIONS + RATES
 
 def check_record(number):
     """Fit the record of this number; return which intervals cover the true values, and a description of any failure."""
-    law, sine, quantised, order = CASES[number % len(CASES)]
-    record, truth, _ = random_record(number, law, sine, quantised, SAMPLES, order)
+    law, sine, is_quantised, order = CASES[number % len(CASES)]
+    record, truth, _ = random_record(number, law, sine, is_quantised, SAMPLES, order)
     try:
         fit = identify(record, pendulum=sine)
     except HarnessError as refusal:
         return [], str(refusal)
-    by_name = {one.name: one for one in fit.estimates}
+    by_name = {estimate.name: estimate for estimate in fit.estimates}
     off = max(abs(by_name[name].value - truth[name]) / by_name[name].error for name in NAMES)
     wrong = f"off by {off:.1f} errors" if off > FAR and not fit.remarks else ""
     return [by_name[name].low <= truth[name] <= by_name[name].high for name in NAMES], wrong
@@ -44,15 +44,17 @@ def table_lines(rows):
     yield f"{'law':12} {'kind':9} {'quantity':13} {'noise':10} {'records':>7} " + " ".join(
         f"{name:>6}" for name in (*NAMES, "all")
     )
-    for i, (law, sine, quantised, order) in enumerate(CASES):
-        held = [held for held, _ in rows[i :: len(CASES)] if held]
-        kind, noise = "pendulum" if sine else "mass", "quantised" if quantised else "white"
-        shares = np.mean(held, axis=0) if held else np.full(len(NAMES), np.nan)
-        yield f"{'+'.join(law):12} {kind:9} {QUANTITIES[order]:13} {noise:10} {len(held):7} " + " ".join(
+    for i, (law, sine, is_quantised, order) in enumerate(CASES):
+        coverage = [coverage for coverage, _ in rows[i :: len(CASES)] if coverage]
+        kind, noise = "pendulum" if sine else "mass", "quantised" if is_quantised else "white"
+        shares = np.mean(coverage, axis=0) if coverage else np.full(len(NAMES), np.nan)
+        yield f"{'+'.join(law):12} {kind:9} {QUANTITIES[order]:13} {noise:10} {len(coverage):7} " + " ".join(
             f"{share:6.3f}" for share in (*shares, shares.mean())
         )
-    held = [held for held, _ in rows if held]
-    yield f"{'all':47} {len(held):7} " + " ".join(f"{share:6.3f}" for share in (*np.mean(held, 0), np.mean(held)))
+    coverage = [coverage for coverage, _ in rows if coverage]
+    yield f"{'all':47} {len(coverage):7} " + " ".join(
+        f"{share:6.3f}" for share in (*np.mean(coverage, 0), np.mean(coverage))
+    )
     yield from (f"record {number}: {text}" for number, (_, text) in enumerate(rows) if text)
 
 

@@ -68,9 +68,9 @@ def check_record(task):
         fit = identify_decay((t / (2 * np.pi), x), unit="m", progress=False)
     except HarnessError:
         return None
-    contained = [fit[name].low <= value <= fit[name].high for name, value in (("zeta", zeta), ("r", AMPLITUDE * r))]
+    coverage = [fit[name].low <= value <= fit[name].high for name, value in (("zeta", zeta), ("r", AMPLITUDE * r))]
     text = " ".join(fit.remarks)
-    return "in speed by" in text or "in amplitude by" in text, contained, bool(text)
+    return "in speed by" in text or "in amplitude by" in text, coverage, bool(text)
 
 
 if __name__ == "__main__":
@@ -82,8 +82,8 @@ if __name__ == "__main__":
                 n = 5 * count if case[0] == 1 else count
                 rows = [row for row in pool.map(check_record, [(case, noise, i) for i in range(n)]) if row]
                 holds = np.mean([row[1] for row in rows])
-                shown, remarks = (sum(row[i] for row in rows) for i in (0, 2))
+                n_shown, remarks = (sum(row[i] for row in rows) for i in (0, 2))
                 print(
-                    f"{case[0]:4} {case[1]:5} {noise:6.0e} {len(rows):6} {shown:5} {holds:6.2f} {remarks:6}",
+                    f"{case[0]:4} {case[1]:5} {noise:6.0e} {len(rows):6} {n_shown:5} {holds:6.2f} {remarks:6}",
                     flush=True,
                 )

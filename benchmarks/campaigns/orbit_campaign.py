@@ -22,8 +22,8 @@ from scipy.optimize import brentq
 import harness
 
 PRECISION = 1e-8  # relative difference of periods
-SAME = 1e-6  # the same of amplitudes
-SETTLED = 1e-11  # relative difference of neighbouring maxima
+AMPLITUDE_TOLERANCE = 1e-6  # relative difference of equal amplitudes
+SETTLED_DIFFERENCE = 1e-11  # relative difference of neighbouring maxima
 STEADY = 1e-7  # share of the amplitude that sticks, of steady sliding
 MAX_TURNS = 300
 LAWS = ("exponential", "stribeck", "hyperbola", "polynomial")
@@ -149,7 +149,7 @@ class Oscillator:
             t, x, sticks = self.next_maximum(time, x, 0.0)
             if abs(x - steady) <= STEADY * self.amplitude:
                 return End("steady sliding")
-            if abs(x - maxima[-1]) <= SETTLED * abs(x - steady):
+            if abs(x - maxima[-1]) <= SETTLED_DIFFERENCE * abs(x - steady):
                 return End("stick-slip" if sticks else "sliding orbit", t - time, x)
             time = t
         decay = (x - maxima[-1]) / (maxima[-1] - maxima[-2])
@@ -199,23 +199,23 @@ def check(fmu, values):
     stable = [motion for motion in result.motions if motion.stability == "stable"]
     failures = []
     for end in ends:
-        same = [motion for motion in stable if motion.kind == end.kind]
+        matching_motions = [motion for motion in stable if motion.kind == end.kind]
         if end.kind != "steady sliding":
-            same = [
+            matching_motions = [
                 motion
-                for motion in same
+                for motion in matching_motions
                 if abs(motion.period / end.period - 1.0) <= PRECISION
-                and abs(motion.largest - end.largest) <= SAME * abs(end.largest - steady)
+                and abs(motion.largest - end.largest) <= AMPLITUDE_TOLERANCE * abs(end.largest - steady)
             ]
-        if not same:
-            found = [(motion.kind, motion.stability, motion.period, motion.largest) for motion in result.motions]
-            failures.append(f"{end} is not among {found} {result.remarks}")
+        if not matching_motions:
+            motions = [(motion.kind, motion.stability, motion.period, motion.largest) for motion in result.motions]
+            failures.append(f"{end} is not among {motions} {result.remarks}")
     return ends, failures
 
 
 def main(count, seed):
     """Check oscillators; return the exit status."""
-    counts, decays, failed = Counter(), [], 0
+    counts, decays, n_failed = Counter(), [], 0
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "rubbed.py")
         file.write_text(MODEL, encoding="utf-8")
@@ -226,14 +226,14 @@ def main(count, seed):
             counts.update(end.kind for end in ends)
             decays += [float(end.decay) for end in ends if end.decay == end.decay]
             print(f"{number + 1} of {count}", end="\r", file=sys.stderr, flush=True)
-            failed += bool(failures)
+            n_failed += bool(failures)
             for failure in dict.fromkeys(failures):
                 print(f"{number}: {failure}\n    {values}", flush=True)
-    print(f"{count} oscillators, {failed} with failures; motions: {dict(counts)}")
+    print(f"{count} oscillators, {n_failed} with failures; motions: {dict(counts)}")
     if decays:
         factors = f"{min(decays):.4g} to {max(decays):.4g}"
         print(f"{len(decays)} motions had not settled after {MAX_TURNS} turns: they do by {factors} in a turn")
-    return int(failed > 0)
+    return int(n_failed > 0)
 
 
 if __name__ == "__main__":

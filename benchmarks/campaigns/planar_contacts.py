@@ -28,9 +28,9 @@ from benchmarks.references.plane import rest
 from harness.process.temporary_directory import temporary_directory
 
 NATIVE = ("--native", "--platform", "linux64")
-ALLOWED, ALLOWED_DRIVEN, RTOL = 1e-9, 1e-8, 1e-10
+MAX_ERROR, MAX_DRIVEN_ERROR, RTOL = 1e-9, 1e-8, 1e-10
 # Of an importer's solver: its tolerance, and errors in terms of it
-EXCHANGE_RTOL, ALLOWED_EXCHANGE, ALLOWED_EXCHANGE_DRIVEN = 1e-8, 100.0, 1000.0
+EXCHANGE_RTOL, MAX_EXCHANGE_ERROR, MAX_DRIVEN_EXCHANGE_ERROR = 1e-8, 100.0, 1000.0
 STOP = 4.0  # s, of a driven motion
 SLOW, KICK, NEAR_TIE = (
     1e-8,
@@ -97,9 +97,9 @@ def errors_at_rest(
         return np.inf, np.inf, np.inf, np.inf
     along = run["x"][-1] * cos(turn) + run["y"][-1] * sin(turn) - x
     across = run["y"][-1] * cos(turn) - run["x"][-1] * sin(turn) - y
-    held = hypot(run["R.x"][-1] - force[0], run["R.y"][-1] - force[1]) / f
+    hold_error = hypot(run["R.x"][-1] - force[0], run["R.y"][-1] - force[1]) / f
     speed_after = hypot(run["v_x"][-1], run["v_y"][-1])
-    return abs(run.events.t[-1] / time - 1.0), hypot(along, across) / (speed * time), speed_after, held
+    return abs(run.events.t[-1] / time - 1.0), hypot(along, across) / (speed * time), speed_after, hold_error
 
 
 def puck_values(m: float, f: float, speed: float, angle: float) -> dict[str, float]:
@@ -151,7 +151,7 @@ def constant(F_x: float, F_y: float, stop: float) -> dict[str, list[float]]:
 
 
 @dataclass
-class Driven:
+class DrivenMotion:
     """Parameters of the model, and the force as (time at which it begins, F_x, F_y)."""
 
     values: dict[str, float]
@@ -175,7 +175,7 @@ class Driven:
         return dict(zip(("time", "F_x", "F_y"), map(list, zip(*rows, strict=True)), strict=True))
 
 
-def random_driven(seed: int) -> Driven:
+def random_driven(seed: int) -> DrivenMotion:
     """Return a random driven motion."""
     random = np.random.default_rng([65, seed])
     f = random.uniform(0.5, 5.0)
@@ -195,20 +195,20 @@ def random_driven(seed: int) -> Driven:
     }
     values["k_y"] = random.choice([values["k_x"], random.uniform(20.0, 200.0)])
     times = np.sort(random.uniform(0.2, STOP, 2))
-    turned = angle + turn
+    turned_angle = angle + turn
     forces = [
         (0.0, 0.0, 0.0),
         (float(times[0]), size * cos(angle), size * sin(angle)),
-        (float(times[1]), size * cos(turned), size * sin(turned)),
+        (float(times[1]), size * cos(turned_angle), size * sin(turned_angle)),
     ]
-    return Driven({name: float(value) for name, value in values.items()}, forces)
+    return DrivenMotion({name: float(value) for name, value in values.items()}, forces)
 
 
 class NearTieError(Exception):
     """The load at rest comes close to its limit."""
 
 
-def solve(motion: Driven) -> tuple[list[float], np.ndarray]:
+def solve(motion: DrivenMotion) -> tuple[list[float], np.ndarray]:
     """Return the times of all changes of mode, and the states at the end, by scipy with located events."""
     p = motion.values
     y, events = np.array([0.0, 0.0, p["v_x0"], p["v_y0"]]), list[float]()
@@ -232,7 +232,7 @@ def solve(motion: Driven) -> tuple[list[float], np.ndarray]:
     return events, y
 
 
-def breakaway(motion: Driven, t: float, end: float, y: np.ndarray, force: tuple[float, float, float]) -> float:
+def breakaway(motion: DrivenMotion, t: float, end: float, y: np.ndarray, force: tuple[float, float, float]) -> float:
     """Return when the load exceeds the holding limit; `end` if it does not."""
     hold = motion.values["hold"]
 
@@ -254,7 +254,7 @@ def breakaway(motion: Driven, t: float, end: float, y: np.ndarray, force: tuple[
 
 
 def slide(
-    motion: Driven, t: float, end: float, y: np.ndarray, force: tuple[float, float, float]
+    motion: DrivenMotion, t: float, end: float, y: np.ndarray, force: tuple[float, float, float]
 ) -> tuple[float, np.ndarray, bool]:
     """Return time and states where the body rests, or at the end, and whether it rests."""
     m, f = motion.values["m"], motion.values["f"]
@@ -284,7 +284,7 @@ def slide(
     return t + KICK, y, False
 
 
-def compare(fmu: str | Path, motion: Driven) -> str:
+def compare(fmu: str | Path, motion: DrivenMotion) -> str:
     """Return how a run differs from the solution; empty if it does not."""
     events, y = solve(motion)
     run = harness.simulate(fmu, motion.values, stop=STOP, inputs=motion.inputs(), rtol=RTOL)
@@ -293,10 +293,10 @@ def compare(fmu: str | Path, motion: Driven) -> str:
         return f"{len(times)} events instead of {len(events)}"
     late = max((abs(a - b) for a, b in zip(times, events, strict=True)), default=0.0)
     away = max(abs(run["x"][-1] - y[0]), abs(run["y"][-1] - y[1]))
-    return f"events off by {late:.1e} s, position by {away:.1e} m" if max(late, away) > ALLOWED_DRIVEN else ""
+    return f"events off by {late:.1e} s, position by {away:.1e} m" if max(late, away) > MAX_DRIVEN_ERROR else ""
 
 
-def compare_exchange(fmu: str | Path, motion: Driven, rtol: float) -> str:
+def compare_exchange(fmu: str | Path, motion: DrivenMotion, rtol: float) -> str:
     """Return how a run in model exchange by CVode differs from one in co-simulation; empty if it does not."""
     inputs = motion.inputs()
     run = harness.simulate(fmu, motion.values, stop=STOP, inputs=inputs, rtol=RTOL)
@@ -307,7 +307,7 @@ def compare_exchange(fmu: str | Path, motion: Driven, rtol: float) -> str:
         return f"{end['events.count']} events in model exchange instead of {len(times)}"
     late = abs(end["events.t_last"] - times[-1]) if times else 0.0
     away = max(abs(run["x"][-1] - end["x"]), abs(run["y"][-1] - end["y"]))
-    is_off = max(late, away) > ALLOWED_EXCHANGE_DRIVEN * rtol
+    is_off = max(late, away) > MAX_DRIVEN_EXCHANGE_ERROR * rtol
     return f"last event off by {late:.1e} s in model exchange, position by {away:.1e} m" if is_off else ""
 
 
@@ -338,22 +338,22 @@ def run_campaign(n_closed: int, n_driven: int, n_exchange: int) -> int:
             failures += 1
             continue
         largest = np.maximum(largest, errors)
-        exchanged = exchange_errors(puck, *scene, rtol=EXCHANGE_RTOL) if n < n_exchange else (0.0, 0.0)
-        if max(errors) > ALLOWED or max(exchanged) > ALLOWED_EXCHANGE:
-            print(f"closed form {n} {scene}: {errors}, by model exchange {exchanged}", flush=True)
+        errors_in_exchange = exchange_errors(puck, *scene, rtol=EXCHANGE_RTOL) if n < n_exchange else (0.0, 0.0)
+        if max(errors) > MAX_ERROR or max(errors_in_exchange) > MAX_EXCHANGE_ERROR:
+            print(f"closed form {n} {scene}: {errors}, by model exchange {errors_in_exchange}", flush=True)
             failures += 1
-        largest_exchanged = np.maximum(largest_exchanged, exchanged)
+        largest_exchanged = np.maximum(largest_exchanged, errors_in_exchange)
     print("largest errors of time and position in model exchange:", *(f"{e:.1f} rtol" for e in largest_exchanged))
     print("largest errors of time, position, speed and hold:", *(f"{error:.1e}" for error in largest), flush=True)
     file = build_cache.kept_folder / "driven.py"
     file.write_text(MODEL, encoding="utf-8")
-    driven = next(build_cache.build_user_model(file, *NATIVE).rglob("driven.fmu"))
+    driven_fmu = next(build_cache.build_user_model(file, *NATIVE).rglob("driven.fmu"))
     near_ties = 0
     for seed in range(n_driven):
         motion = random_driven(seed)
         try:
-            text = compare(driven, motion)
-            text = text or (compare_exchange(driven, motion, EXCHANGE_RTOL) if seed < n_exchange else "")
+            text = compare(driven_fmu, motion)
+            text = text or (compare_exchange(driven_fmu, motion, EXCHANGE_RTOL) if seed < n_exchange else "")
         except NearTieError:
             near_ties += 1
             continue

@@ -45,7 +45,7 @@ STATE_TOLERANCE = 100.0  # times rtol: allowed error of states and changes of va
 MARGIN = 1000.0  # times rtol: decisions with smaller margins are not compared
 MANY_STEPS = 20000  # more steps may add up to proportionally larger errors
 KINK = 100.0  # factor after a limited load has begun or ended: a choose() is not an event, its kink costs accuracy
-AMPLIFIED = 6.0  # times the difference between the references: allowed error
+AMPLIFICATION = 6.0  # times the difference between the references: allowed error
 PERTURBED_RUNS = {1e-6: 2, 1e-11: 1}
 MIN_SIZE = 1e-3  # m and m/s: floor of the size of states, as in the error norm of the solver
 TIME_SCALE = 0.1  # s: 100 rtol of it are allowed for the times of events, more where their guards fall slowly
@@ -58,7 +58,7 @@ BACKENDS = {
 
 
 @dataclass
-class Expected:
+class ExpectedRun:
     """What a run with one tolerance must show; rows are (t, modes, least and most events, time of the last event,
     its tolerance, states, their tolerances)."""
 
@@ -105,24 +105,26 @@ class Failure:
 
 def solve_case(structure, seed):
     """Return the solution of a case and those with changed values for each tolerance, at the same times."""
-    values, tied = random_values(structure, seed)
+    values, has_ties = random_values(structure, seed)
     system = to_system(structure, values)
     solution = solve(system)
     times = sample_times(solution)
-    changed = {}
+    changed_solutions = {}
     for rtol in TOLERANCES:
         names = [f"{structure.seed} {seed} {n}" for n in range(PERTURBED_RUNS[rtol])]
-        changed[rtol] = [solve(perturb(system, STATE_TOLERANCE * rtol, name, tied)) for name in names]
-    for one in (solution, *(other for others in changed.values() for other in others)):
-        one.sample(times)
-    return solution, changed, times, tied
+        changed_solutions[rtol] = [solve(perturb(system, STATE_TOLERANCE * rtol, name, has_ties)) for name in names]
+    for sampled_solution in (solution, *(other for others in changed_solutions.values() for other in others)):
+        sampled_solution.sample(times)
+    return solution, changed_solutions, times, has_ties
 
 
-def make_reference(structure, seed, solved=None):
+def make_reference(structure, seed, solutions=None):
     """Return the reference of a case."""
-    solution, changed, times, tied = solved or solve_case(structure, seed)
+    solution, changed_solutions, times, has_ties = solutions or solve_case(structure, seed)
     size = state_size(solution, times)
-    expected = {rtol: make_expected(solution, changed[rtol], times, size, rtol, tied) for rtol in TOLERANCES}
+    expected = {
+        rtol: make_expected(solution, changed_solutions[rtol], times, size, rtol, has_ties) for rtol in TOLERANCES
+    }
     decisions = [(float(d.t), d.kind, d.contact, float(d.margin)) for d in solution.decisions]
     events = [(float(t), modes) for t, modes in solution.events]
     return Reference(solution.first_modes, events, decisions, solution.failure, times, expected)
@@ -144,28 +146,28 @@ def state_size(solution, times):
 
 def clusters(events):
     """Merge events that are closer together than SAME_TIME: (t, modes after them)."""
-    merged = []
+    merged_events = []
     for t, modes in events:
-        if merged and t - merged[-1][0] < SAME_TIME:
-            merged[-1] = (merged[-1][0], modes)
+        if merged_events and t - merged_events[-1][0] < SAME_TIME:
+            merged_events[-1] = (merged_events[-1][0], modes)
         else:
-            merged.append((t, modes))
-    return merged
+            merged_events.append((t, modes))
+    return merged_events
 
 
-def make_expected(solution, changed, times, size, rtol, tied):
+def make_expected(solution, changed_solutions, times, size, rtol, has_ties):
     """Return what runs with a tolerance must show."""
-    group = clusters if tied else list
+    group = clusters if has_ties else list
     events = group(solution.events)
     until, decision = solution.decided_until(MARGIN * rtol)
     until, reason = min(until, solution.end), f"{decision.kind} {decision.margin:.0e}" if decision else ""
     errors = [0.0] * len(events)
-    for other in changed:
+    for other in changed_solutions:
         others = group(other.events)
         if other.first_modes != solution.first_modes:
             until, reason = 0.0, "changed values"
         for n in range(max(len(events), len(others))):
-            pair = [one[n] if n < len(one) else (inf, None) for one in (events, others)]
+            pair = [sequence[n] if n < len(sequence) else (inf, None) for sequence in (events, others)]
             if pair[0][1] != pair[1][1]:
                 if min(pair)[0] < until:
                     until, reason = min(pair[0][0], pair[1][0]), "changed values"
@@ -175,8 +177,8 @@ def make_expected(solution, changed, times, size, rtol, tied):
     # A guard with the allowed relative error E has its zero within E / steepness.  Changed values do not show this: the
     # exact motion of other values meets a grazing zero with the same geometry.
     scales = [max(TIME_SCALE, 1.0 / max(solution.steepness.get(t, inf), 1e-300)) for t, _ in events]
-    time_errors = [AMPLIFIED * e + STATE_TOLERANCE * rtol * scale for e, scale in zip(errors, scales, strict=True)]
-    result = Expected(float(until), reason)
+    time_errors = [AMPLIFICATION * e + STATE_TOLERANCE * rtol * scale for e, scale in zip(errors, scales, strict=True)]
+    result = ExpectedRun(float(until), reason)
     for t in times:
         near = [
             abs(t - s) <= 2.0 * e * (KINK if solution.kinks else 1.0)
@@ -186,8 +188,8 @@ def make_expected(solution, changed, times, size, rtol, tied):
             continue
         state = solution.states(t)
         kink = KINK if any(s < t for s in solution.kinks) else 1.0
-        error = max((np.abs(other.states(t) - state) for other in changed), key=np.max)
-        done = [n for n, (s, _) in enumerate(events) if s <= t]
+        error = max((np.abs(other.states(t) - state) for other in changed_solutions), key=np.max)
+        past_events = [n for n, (s, _) in enumerate(events) if s <= t]
         changes = [solution.first_modes, *(modes for s, modes in solution.events if s <= t)]
         # a contact that reverses with its load at the limit may stick for a moment
         most = sum(sum(abs(a - b) for a, b in zip(x, y, strict=True)) for x, y in itertools.pairwise(changes))
@@ -195,12 +197,12 @@ def make_expected(solution, changed, times, size, rtol, tied):
             (
                 t,
                 solution.modes(t),
-                len(done),
-                most if tied else len(done),
-                float(events[done[-1]][0]) if done else 0.0,
-                kink * time_errors[done[-1]] if done else 0.0,
+                len(past_events),
+                most if has_ties else len(past_events),
+                float(events[past_events[-1]][0]) if past_events else 0.0,
+                kink * time_errors[past_events[-1]] if past_events else 0.0,
                 state,
-                kink * (AMPLIFIED * error + STATE_TOLERANCE * rtol * size),
+                kink * (AMPLIFICATION * error + STATE_TOLERANCE * rtol * size),
             )
         )
     return result
@@ -223,19 +225,21 @@ def build(structures, folder, backends=tuple(BACKENDS), root=ROOT):
     """Write and build the models of structures by the sources under `root`; return {(seed, backend): path} and the
     refused ones."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths, refused = {}, []
+    paths, failures = {}, []
     for structure in structures:
         file = folder / f"{structure.name}.py"
         file.write_text(write_model(structure))
         for backend in backends:
             out = folder / backend
             command = [sys.executable, "build_fmus.py", str(file), *BACKENDS[backend], *EVERY_METHOD, "--out", str(out)]
-            done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=600)
-            if done.returncode == 0:
+            process = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=600)
+            if process.returncode == 0:
                 paths[structure.seed, backend] = out / f"{structure.name}.fmu"
             else:
-                refused.append(Failure(structure.seed, -1, backend, 0, 0.0, "build", 0.0, done.stderr.strip()[-200:]))
-    return paths, refused
+                failures.append(
+                    Failure(structure.seed, -1, backend, 0, 0.0, "build", 0.0, process.stderr.strip()[-200:])
+                )
+    return paths, failures
 
 
 def names_of(structure):
@@ -307,13 +311,13 @@ def describe(reference, structure, values, t):
     last = reference.first_modes
     for s, modes in reference.events:
         if start <= s <= t:
-            changed = [n for n in range(len(modes)) if modes[n] != last[n]]
-            if len(changed) > 1:
+            contacts = [n for n in range(len(modes)) if modes[n] != last[n]]
+            if len(contacts) > 1:
                 words.append("several")
-            for n in changed:
+            for n in contacts:
                 hold = values.get(f"mu{n}_s", values.get(f"mu{n}_p", values[f"mu{n}_d"]))
                 words += ["no hold"] * (hold == 0.0)
-                words += ["limited"] * structure.contacts[n].limited
+                words += ["limited"] * structure.contacts[n].is_limited
                 words += ["moving belt"] * structure.contacts[n].belt_moves
         last = modes
     margins = [m for s, _, _, m in reference.decisions if start <= s <= t]
@@ -363,11 +367,11 @@ def run_case(worker, paths, structure, seed, reference, backends=("native",), sl
 
 def show(worker, paths, structure, seed, method, rtol):
     """Print the events of a run beside those of the reference."""
-    values, tied = random_values(structure, seed)
+    values, has_ties = random_values(structure, seed)
     reference = make_reference(structure, seed)
     expected = reference.expected.get(rtol)
     print(write_model(structure))
-    print(values, "tied" if tied else "")
+    print(values, "tied" if has_ties else "")
     print("compared until", expected and expected.until, expected and expected.reason, reference.failure)
     names = names_of(structure)
     fmu = worker.instantiate(paths[structure.seed, "native"])
@@ -390,7 +394,7 @@ def show(worker, paths, structure, seed, method, rtol):
     lines += [(0.0, "reference", reference.first_modes, "")]
     lines += [(t, "reference", modes, k + 1) for k, (t, modes) in enumerate(reference.events)]
     lines += [(t, kind, contact, f"{margin:.1e}") for t, kind, contact, margin in reference.decisions]
-    for line in sorted(lines, key=lambda one: one[0]):
+    for line in sorted(lines, key=lambda item: item[0]):
         print(f"{line[0]:.12f} {line[1]:10} {line[2]} {line[3]}")
     fmu.free()
 

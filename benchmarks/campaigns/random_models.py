@@ -27,7 +27,7 @@ class ContactShape:
     load_1: bool
     load_t: bool
     load_q: int  # body on whose position the load depends, or -1
-    limited: bool
+    is_limited: bool
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Structure:
         Such a contact has events at reversals without friction too.
         """
         c = self.contacts[0]
-        return self.n == 1 and not (c.belt or c.load_1 or c.load_t or c.limited or self.force_1[0])
+        return self.n == 1 and not (c.belt or c.load_1 or c.load_t or c.is_limited or self.force_1[0])
 
     @property
     def has_clock(self):
@@ -90,7 +90,7 @@ def random_structure(seed):
         belt = rng.random() < 0.35
         load_1, load_t = rng.random() < 0.3, rng.random() < 0.15
         load_q = rng.randrange(n) if rng.random() < 0.15 else -1
-        limited = (load_1 or load_t or load_q >= 0) and rng.random() < 0.6
+        is_limited = (load_1 or load_t or load_q >= 0) and rng.random() < 0.6
         contacts.append(
             ContactShape(
                 tuple(row),
@@ -100,8 +100,8 @@ def random_structure(seed):
                 rng.random() < 0.75,
                 load_1,
                 load_t,
-                load_q if limited else -1,
-                limited,
+                load_q if is_limited else -1,
+                is_limited,
             )
         )
     return Structure(
@@ -203,10 +203,10 @@ def write_model(structure):
         load = f"load{n}_0" + f" + load{n}_1 * swing" * c.load_1 + f" + load{n}_t * clock" * c.load_t
         load += f" + load{n}_q * x{c.load_q}" if c.load_q >= 0 else ""
         add(f"weight{n} = {load}")
-        if c.limited:
+        if c.is_limited:
             functions.add("choose")
             add(f"pressed{n} = choose(weight{n} > 0.0, weight{n}, 0.0)")
-        normal = f"pressed{n}" if c.limited else f"weight{n}"
+        normal = f"pressed{n}" if c.is_limited else f"weight{n}"
         slip = " ".join(
             f"{'+' if g > 0 else '-'} {f'{abs(g)}.0 * ' if abs(g) > 1 else ''}v{i}" for i, g in enumerate(c.row) if g
         ).removeprefix("+ ")
@@ -243,42 +243,42 @@ def random_values(structure, seed):
     Two of five sets have ties: round values, equal for all bodies, starts at rest or exactly at the holding limit.
     """
     s, rng = structure, random.Random(f"values {structure.seed} {seed}")
-    tied = rng.random() < 0.4
+    has_ties = rng.random() < 0.4
 
     def pick(low, high, *round_values):
-        if tied:
+        if has_ties:
             return rng.choice(round_values)
         return low * (high / low) ** rng.random()
 
     values = {}
     mass, stiffness = pick(0.5, 4.0, 1.0, 2.0), pick(20.0, 400.0, 32.0, 128.0)
     for i in range(s.n):
-        values[f"m{i}"] = mass if tied else pick(0.5, 4.0)
-        at_rest = rng.random() < (0.8 if tied else 0.3)
-        values[f"x{i}_0"] = rng.choice([0.0, 0.0, 0.125, 0.25, -0.25]) if tied else rng.uniform(-0.3, 0.3)
+        values[f"m{i}"] = mass if has_ties else pick(0.5, 4.0)
+        at_rest = rng.random() < (0.8 if has_ties else 0.3)
+        values[f"x{i}_0"] = rng.choice([0.0, 0.0, 0.125, 0.25, -0.25]) if has_ties else rng.uniform(-0.3, 0.3)
         values[f"v{i}_0"] = 0.0 if at_rest else rng.choice([-1, 1]) * pick(0.02, 1.0, 0.25, 0.5)
     for n, (_, _, cubic, damper) in enumerate(s.springs):
-        values[f"k{n}"] = stiffness if tied else pick(20.0, 400.0)
+        values[f"k{n}"] = stiffness if has_ties else pick(20.0, 400.0)
         if cubic:
             values[f"h{n}"] = pick(10.0, 2000.0, 0.0, 512.0)
         if damper:
-            values[f"c{n}"] = rng.choice([0.0, 1.0]) if tied else pick(0.05, 5.0)
+            values[f"c{n}"] = rng.choice([0.0, 1.0]) if has_ties else pick(0.05, 5.0)
     load, force = pick(4.0, 40.0, 8.0, 16.0), pick(0.5, 20.0, 2.0, 4.0)
     for i in range(s.n):
         if s.force_0[i]:
-            values[f"p{i}"] = force if tied else rng.choice([-1, 1]) * pick(0.2, 15.0)
+            values[f"p{i}"] = force if has_ties else rng.choice([-1, 1]) * pick(0.2, 15.0)
         if s.force_1[i]:
-            values[f"a{i}"] = rng.choice([force, 2.0 * force, 4.0 * force]) if tied else pick(0.5, 30.0)
+            values[f"a{i}"] = rng.choice([force, 2.0 * force, 4.0 * force]) if has_ties else pick(0.5, 30.0)
     if s.has_angle:
         values["Omega"] = pick(1.5, 25.0, 4.0, 8.0)
-        values["angle_0"] = 0.0 if tied else rng.uniform(0.0, 2.0 * pi)
+        values["angle_0"] = 0.0 if has_ties else rng.uniform(0.0, 2.0 * pi)
     if s.has_driver:
         values["v_driver"] = rng.choice([-1, 1]) * pick(0.05, 0.6, 0.125, 0.25)
     level = pick(0.1, 0.5, 0.25, 0.5)
     for n, c in enumerate(s.contacts):
-        values[f"load{n}_0"] = load if tied else pick(4.0, 40.0)
+        values[f"load{n}_0"] = load if has_ties else pick(4.0, 40.0)
         free = rng.random() < 0.08
-        mu_d = 0.0 if free else level if tied else pick(0.05, 0.6)
+        mu_d = 0.0 if free else level if has_ties else pick(0.05, 0.6)
         peak = mu_d * (rng.choice([1.0, 1.02, 1.25, 1.5, 2.0]) if c.curve else 1.0)
         values[f"mu{n}_d"] = mu_d
         if c.curve:
@@ -290,17 +290,17 @@ def random_values(structure, seed):
             values[f"belt{n}_0"] = 0.0 if rng.random() < 0.1 else rng.choice([-1, 1]) * pick(0.03, 0.5, 0.125, 0.25)
         if c.belt_moves:
             values[f"belt{n}_1"] = pick(0.01, 0.4, 0.0, 0.125)
-        share = rng.choice([0.3, 0.8, 1.2, 1.6]) if c.limited else rng.choice([0.3, 0.6, 0.9])
+        share = rng.choice([0.3, 0.8, 1.2, 1.6]) if c.is_limited else rng.choice([0.3, 0.6, 0.9])
         if c.load_1:
             values[f"load{n}_1"] = values[f"load{n}_0"] * share
         if c.load_t:
-            slope = rng.uniform(-0.4, 0.5) if c.limited else rng.uniform(0.02, 0.3)
+            slope = rng.uniform(-0.4, 0.5) if c.is_limited else rng.uniform(0.02, 0.3)
             values[f"load{n}_t"] = slope * values[f"load{n}_0"]
         if c.load_q >= 0:
             values[f"load{n}_q"] = rng.choice([-1, 1]) * values[f"load{n}_0"] * rng.choice([0.5, 2.0, 4.0])
-    if tied and rng.random() < 0.5:
+    if has_ties and rng.random() < 0.5:
         start_at_limit(s, values)
-    return values, tied
+    return values, has_ties
 
 
 def start_at_limit(structure, values):
@@ -344,7 +344,7 @@ def to_system(structure, values):
                 get(f"load{n}_1"),
                 get(f"load{n}_t"),
                 tuple(load_q),
-                c.limited,
+                c.is_limited,
                 values.get(f"v_s{n}", 1.0),
                 get(f"belt{n}_0"),
                 get(f"belt{n}_1"),
@@ -366,7 +366,7 @@ def to_system(structure, values):
     )
 
 
-def perturb(system, share, seed, tied):
+def perturb(system, share, seed, has_ties):
     """Return a system whose values differ by `share`; with ties, only by common factors that keep the ties."""
     rng = random.Random(f"perturbation {seed}")
 
@@ -374,7 +374,7 @@ def perturb(system, share, seed, tied):
         return 1.0 + share * rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 1.0)
 
     mass, damping = factor(), factor()
-    if tied:
+    if has_ties:
         return replace(
             system,
             masses=tuple(m * mass for m in system.masses),

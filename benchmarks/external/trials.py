@@ -154,22 +154,22 @@ def try_fmu(fmu: Path, folder: Path, timeout: float) -> Iterator[Trial]:
         target = folder / name
         rest = [*options, "--out", str(target), *more]
         reply = run_in_terminal(["compare", str(first), str(fmu), *rest], timeout)
-        found = next(iter(target.glob("compare/*/compare.json")), target / "none")
-        variables = read_json(found).get("variables", [])
+        file = next(iter(target.glob("compare/*/compare.json")), target / "none")
+        variables = read_json(file).get("variables", [])
         return reply, max((variable["relative"] for variable in variables), default=nan)
 
     if description.coSimulation and description.modelExchange:
         reply, difference = compare("exchange", folder / fmu.stem, "--interface", "ModelExchange")
-        judged = judge_difference(reply, difference, SOLVER_RTOL, "co-simulation", INEXACT)  # it may have a large step
-        yield Trial(fmu.stem, fmi, "exchange", *judged, *times_of(reply))
-    varied = simulate_by_fmpy(fmu, stop, folder, timeout)
+        verdict = judge_difference(reply, difference, SOLVER_RTOL, "co-simulation", INEXACT)  # it may have a large step
+        yield Trial(fmu.stem, fmi, "exchange", *verdict, *times_of(reply))
+    varied_parameter = simulate_by_fmpy(fmu, stop, folder, timeout)
     if (folder / "reference.csv").is_file():
         reply, difference = compare("compare", folder / "reference.csv")
-        allowed = COMPARE_RTOL if description.coSimulation else SOLVER_RTOL
-        judged = judge_difference(reply, difference, allowed, "fmpy", FAULT)  # at the same steps
-        yield Trial(fmu.stem, fmi, "compare", *judged, *times_of(reply))
-    if varied:
-        name, value, other = varied
+        tolerance = COMPARE_RTOL if description.coSimulation else SOLVER_RTOL
+        verdict = judge_difference(reply, difference, tolerance, "fmpy", FAULT)  # at the same steps
+        yield Trial(fmu.stem, fmi, "compare", *verdict, *times_of(reply))
+    if varied_parameter:
+        name, value, other = varied_parameter
         reply = run_in_terminal(
             ["sweep", str(fmu), "--vary", f"{name}={value!r},{other!r}", "--measures", "final", *options], timeout
         )
@@ -207,14 +207,14 @@ def simulate_by_fmpy(fmu: Path, stop: str, folder: Path, timeout: float) -> list
     """Write reference.csv and record.csv; return the varied parameter with both values, empty if there is none."""
     script = Path(__file__).with_name("fmpy_reference.py")
     with suppress(subprocess.TimeoutExpired):
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, str(script), str(fmu), stop, str(folder)],
             capture_output=True,
             text=True,
             timeout=timeout,
             cwd=folder,
         )
-        lines = [line for line in done.stdout.splitlines() if line.startswith("[")]
+        lines = [line for line in process.stdout.splitlines() if line.startswith("[")]
         return json.loads(lines[-1]) if lines else []
     return []
 
@@ -228,7 +228,7 @@ def judge_run(reply: Reply, note: str) -> tuple[str, str]:
     return (INEXACT if "error unknown" in note or "error about" in note else RIGHT), note
 
 
-def judge_difference(reply: Reply, difference: float, allowed: float, other: str, beyond: str) -> tuple[str, str]:
+def judge_difference(reply: Reply, difference: float, tolerance: float, other: str, beyond: str) -> tuple[str, str]:
     """Return outcome and text of a comparison with the values of another program or interface.
 
     `beyond` is the outcome of a difference that is not allowed.
@@ -237,7 +237,7 @@ def judge_difference(reply: Reply, difference: float, allowed: float, other: str
         return reply.failed_outcome
     if difference != difference:
         return REFUSED, reply.message or "no common variable"
-    return (RIGHT if difference <= allowed else beyond), f"largest difference from {other} {difference:.1e}"
+    return (RIGHT if difference <= tolerance else beyond), f"largest difference from {other} {difference:.1e}"
 
 
 def judge_sweep(reply: Reply, folder: Path, result: Trajectory, values: str) -> tuple[str, str]:
@@ -266,8 +266,8 @@ def judge_fit(reply: Reply, folder: Path, name: str, expected: float, record: Pa
     """Return outcome and text of a fit of a record that fmpy simulated with another value of the parameter."""
     if not reply.is_orderly:
         return reply.failed_outcome
-    found = next(iter(folder.glob("fit/*/fit.json")), folder / "none")
-    result = read_json(found)
+    file = next(iter(folder.glob("fit/*/fit.json")), folder / "none")
+    result = read_json(file)
     if reply.status or not result:
         return REFUSED, f"{name}: {reply.message}"
     [row] = [row for row in result["fit"] if row["name"] == name]

@@ -70,9 +70,9 @@ def run_matrix(environments: Path, out: Path, report: Callable[[str, float], Non
     runs: list[HostRun] = []
     with temporary_directory("hosts-") as folder:
         for i, (kind, options) in enumerate(KINDS.items()):
-            done = run_module("build_fmus", *MODELS, *options, "--out", str(folder / str(i)))
-            if done.returncode:
-                raise HarnessError(f"the FMUs ({kind}) could not be built: {done.stderr.strip()}")
+            process = run_module("build_fmus", *MODELS, *options, "--out", str(folder / str(i)))
+            if process.returncode:
+                raise HarnessError(f"the FMUs ({kind}) could not be built: {process.stderr.strip()}")
         for host in HOSTS:
             python = install(host, environments)
             fmpy = read_version(python, "fmpy")
@@ -92,9 +92,9 @@ def install(host: Host, environments: Path) -> Path:
     python = folder / "bin" / "python"
     if not (folder / "installed").is_file():
         venv.create(folder, with_pip=True, clear=True)
-        done = subprocess.run([python, "-m", "pip", "install", "-q", host.package], capture_output=True, text=True)
-        if done.returncode:
-            raise HarnessError(f"{host.package} could not be installed: {done.stderr.strip().splitlines()[-1]}")
+        process = subprocess.run([python, "-m", "pip", "install", "-q", host.package], capture_output=True, text=True)
+        if process.returncode:
+            raise HarnessError(f"{host.package} could not be installed: {process.stderr.strip().splitlines()[-1]}")
         (folder / "installed").touch()
     return python
 
@@ -107,21 +107,21 @@ def read_version(python: Path, package: str) -> str:
 
 def run_models(python: Path, host: Host, folder: Path) -> Iterator[tuple[str, float, str]]:
     """Yield the name of each model with its largest error, or with the text of its failure."""
-    certified = {model: read_certified(model) for model in MODELS}
+    references = {model: read_certified(model) for model in MODELS}
     requests = [
         (str(folder / f"{model}.fmu"), (time[-1] - time[0]) / (len(time) - 1), time[-1], name)
-        for model, (time, _, name) in certified.items()
+        for model, (time, _, name) in references.items()
     ]
     command = [str(python), str(Path(__file__).with_name(host.script)), json.dumps(requests)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
+        process = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
         raise HarnessError(f"{host.package} does not end within {TIMEOUT:g} s") from None
-    replies = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[[")]
+    replies = [json.loads(line) for line in process.stdout.splitlines() if line.startswith("[[")]
     replies += [([], "no reply")] * (len(MODELS) - len(replies))
-    messages = re.split("^---$", done.stderr, flags=re.M)[1:] + [""] * len(MODELS)
+    messages = re.split("^---$", process.stderr, flags=re.M)[1:] + [""] * len(MODELS)
     for model, (values, failure), text in zip(MODELS, replies, messages, strict=False):
-        yield (model, *judge(values, certified[model][1][host.first :], failure, text))
+        yield (model, *judge(values, references[model][1][host.first :], failure, text))
 
 
 def judge(values: list[float], expected: np.ndarray, failure: str, messages: str) -> tuple[float, str]:
@@ -160,6 +160,6 @@ def failure_lines(runs: list[HostRun]) -> Iterator[str]:
     """Yield the texts of the failures of each host and kind, those of the first model that fails."""
     for host in HOSTS:
         for kind in KINDS:
-            failed = [run for run in runs if (run.host, run.kind) == (host.package, kind) and run.failure]
-            if failed:
-                yield f"{host.package}, {kind}: {failed[0].failure}"
+            failed_runs = [run for run in runs if (run.host, run.kind) == (host.package, kind) and run.failure]
+            if failed_runs:
+                yield f"{host.package}, {kind}: {failed_runs[0].failure}"

@@ -235,15 +235,15 @@ def check_failure(importer: Importer, request: ImporterRequest) -> str:
         raise CheckFailedError("no message on standard error")
     if importer.shows_log and len(lines) != 2 * len(own_lines):
         raise CheckFailedError("no message in the log")
-    rows, accepted = result.reply.rows, result.reply.accepted
-    if importer.checks_status and accepted == request.steps:
+    rows, n_accepted = result.reply.rows, result.reply.n_accepted
+    if importer.checks_status and n_accepted == request.steps:
         raise CheckFailedError("every step was accepted")
-    unchanged = replace(request.run, values={})
+    unchanged_run = replace(request.run, values={})
     expected = run_request(
-        IMPORTERS[0], replace(request, run=unchanged, midrun_changes={}, instances=["a"], rerun=False)
+        IMPORTERS[0], replace(request, run=unchanged_run, midrun_changes={}, instances=["a"], rerun=False)
     ).reply.rows
     if importer.checks_status:
-        if not (all(isnan(value) for value in rows[-1]) or rows[-1] == rows[accepted]):
+        if not (all(isnan(value) for value in rows[-1]) or rows[-1] == rows[n_accepted]):
             raise CheckFailedError(f"returns {rows[-1][0]!r} after the failure")
     elif not all(isnan(value) for value in rows[-1]):
         largest_difference(rows, expected)

@@ -32,7 +32,7 @@ def run_request(request: ImporterRequest, prefixes: tuple[str, ...] = ("",)) -> 
 
 def run_instances(request: ImporterRequest, instances: list[Any], version: str) -> ImporterReply:
     """Execute a request with instances, and free them; `version` is that of the tool."""
-    rows, accepted = run(request, instances, request.run.values, request.midrun_changes)
+    rows, n_accepted = run(request, instances, request.run.values, request.midrun_changes)
     rerun: list[list[float]] = []
     if request.rerun:
         for instance in instances:
@@ -40,7 +40,7 @@ def run_instances(request: ImporterRequest, instances: list[Any], version: str) 
         rerun, _ = run(request, instances, {}, {})
     for instance in instances:
         instance.freeInstance()
-    return ImporterReply(version, rows, rerun, accepted)
+    return ImporterReply(version, rows, rerun, n_accepted)
 
 
 def run(
@@ -49,13 +49,13 @@ def run(
     """Return the rows of one run and the number of accepted steps; a refused value or step ends the run."""
     references = request.references
     output_references = [references[name] for name in request.run.outputs]
-    refused: list[FMICallException] = []
+    errors: list[FMICallException] = []
 
     def write(instance: Any, new: dict[str, float]) -> None:
         try:
             instance.setReal([references[name] for name in new], list(new.values()))
         except FMICallException as error:
-            refused.append(error)
+            errors.append(error)
 
     def row() -> list[float]:
         return [value for instance in instances for value in instance.getReal(output_references)]
@@ -71,19 +71,19 @@ def run(
         instance.enterInitializationMode()
         with suppress(FMICallException):  # ignored, as for the steps below
             instance.exitInitializationMode()
-    rows, accepted = [row()], 0
+    rows, n_accepted = [row()], 0
     for i in range(request.steps):
         transfer()
         if i == request.steps // 2:
             write(instances[0], midrun_changes)
         try:
-            for instance in instances if not refused else []:
+            for instance in instances if not errors else []:
                 instance.doStep(request.step * i, request.step)
-            accepted += not refused
+            n_accepted += not errors
         except FMICallException as error:
-            refused.append(error)  # the tool logs the error; the check reads the later values
+            errors.append(error)  # the tool logs the error; the check reads the later values
         rows.append(row())
-    return rows, accepted
+    return rows, n_accepted
 
 
 def make_callbacks(prefixes: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:

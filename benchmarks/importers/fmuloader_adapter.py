@@ -30,10 +30,10 @@ class Instance:
     def __getattr__(self, name: str) -> Callable[..., Any]:
         return partial(self.call, snake_case(name))
 
-    def call(self, name: str, *arguments: Any, **named: Any) -> Any:
+    def call(self, name: str, *arguments: Any, **options: Any) -> Any:
         """Call a function; raise FMICallException for a status above warning, also for discard."""
         try:
-            result = getattr(self.slave, name)(*arguments, **{snake_case(key): value for key, value in named.items()})
+            result = getattr(self.slave, name)(*arguments, **{snake_case(key): value for key, value in options.items()})
         except Fmi2Error as error:
             raise FMICallException(error.func_name, int(error.status)) from None
         if result is Fmi2Status.DISCARD:

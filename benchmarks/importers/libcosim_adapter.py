@@ -15,9 +15,9 @@ NANO = 1e9  # libcosim counts time in ns
 
 def run_request(request: ImporterRequest) -> ImporterReply:
     log_output_level(CosimLogLevel.ERROR)
-    rows, accepted = run(request, request.run.values, request.midrun_changes)
+    rows, n_accepted = run(request, request.run.values, request.midrun_changes)
     rerun = run(request, {}, {})[0] if request.rerun else []
-    return ImporterReply(version("libcosimpy"), rows, rerun, accepted)
+    return ImporterReply(version("libcosimpy"), rows, rerun, n_accepted)
 
 
 def run(
@@ -41,11 +41,11 @@ def run(
     def row() -> list[float]:
         return [value for index in indices for value in observer.last_real_values(index, output_references)]
 
-    rows, accepted = [row()], 0
+    rows, n_accepted = [row()], 0
     for i in range(request.steps):
         if i == request.steps // 2 and midrun_changes:
             names, new = list(midrun_changes), list(midrun_changes.values())
             manipulator.slave_real_values(indices[0], [references[name] for name in names], new)
-        accepted += execution.step(1)
+        n_accepted += execution.step(1)
         rows.append(row())
-    return rows, accepted
+    return rows, n_accepted

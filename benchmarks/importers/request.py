@@ -44,14 +44,14 @@ class ImporterReply:
         Version of the tool.
     rows, rerun : list of list of float
         Rows of values at the communication points, of the run and of the rerun.
-    accepted : int
+    n_accepted : int
         Number of accepted steps.
     """
 
     version: str
     rows: list[list[float]]
     rerun: list[list[float]]
-    accepted: int
+    n_accepted: int
 
 
 def run_in_adapter(module: str, request: ImporterRequest) -> ImporterReply:

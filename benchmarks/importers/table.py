@@ -94,8 +94,8 @@ def run_checks(folder: Path, report: Callable[[str, float], None]) -> list[Check
             report(importer.name, 1.0)
             name = name_with_version(importer, subjects[0].base_request)
             for check, *cells in zip(CHECKS, *columns, strict=True):
-                failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
-                results.append(CheckResult(name, check, tuple(cells), failed, fmus=names))
+                failures = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
+                results.append(CheckResult(name, check, tuple(cells), failures, fmus=names))
     return results + [CheckResult(name, "", reason=reason) for name, reason in NOT_RUN.items()]
 
 

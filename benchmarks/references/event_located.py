@@ -81,12 +81,12 @@ class HybridProblem:
         self.stop_slip(y, modes)
         while True:
             contacts = self.contacts(t, y, modes)
-            overloaded = [
+            overloaded_contacts = [
                 i for i, (_, f, hold) in enumerate(contacts) if modes[i] == 0 and abs(f) > hold * (1.0 + OVERLOAD)
             ]
-            if not overloaded:
+            if not overloaded_contacts:
                 return
-            modes[overloaded[0]] = 1 if contacts[overloaded[0]][1] > 0.0 else -1
+            modes[overloaded_contacts[0]] = 1 if contacts[overloaded_contacts[0]][1] > 0.0 else -1
 
 
 Events = list[tuple[float, tuple[int, ...]]]

@@ -81,8 +81,10 @@ def certify_puck() -> Solution:
     # the force is along -y: the motion is that of the closed form turned by -90 degrees, and mirrored where v_x > 0
     along, across = -v_y0, v_x0
     phi = atan2(across, along)
-    turned = motion(m, F, f, hypot(along, across), phi, times.tolist())
-    states = np.column_stack([turned[:, 1], 0.0 - turned[:, 0], turned[:, 3], 0.0 - turned[:, 2]])
+    turned_motion = motion(m, F, f, hypot(along, across), phi, times.tolist())
+    states = np.column_stack(
+        [turned_motion[:, 1], 0.0 - turned_motion[:, 0], turned_motion[:, 3], 0.0 - turned_motion[:, 2]]
+    )
     t_rest, *_ = rest(m, F, f, hypot(along, across), phi)
 
     def rates(t: float, y: np.ndarray) -> list[float]:

@@ -61,7 +61,7 @@ class Rival:
     def lines(self) -> int:
         """Return the number of lines of code that a user writes for all scenes."""
         files = [ENGINES / f"{self.module}.py"]
-        if self is OWN:
+        if self is OWN_RIVAL:
             files += [MODELS / name for name in ("coulomb.py", "stickslip.py", "pendulum.py", "more/belt.py")]
             files.append(MODELS / "more/clutch.py")
         return sum(count_lines(file.read_text(encoding="utf-8")) for file in files)
@@ -69,16 +69,16 @@ class Rival:
 
 def count_lines(source: str) -> int:
     """Return the number of lines of code: without blank lines, comments and docstrings."""
-    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    excluded: set[int] = set()
+    documented_types = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    excluded_lines: set[int] = set()
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, documented) and ast.get_docstring(node) is not None:
-            excluded.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+        if isinstance(node, documented_types) and ast.get_docstring(node) is not None:
+            excluded_lines.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
     lines = enumerate(source.splitlines(), start=1)
-    return sum(1 for number, line in lines if number not in excluded and re.match(r"\s*[^#\s]", line))
+    return sum(1 for number, line in lines if number not in excluded_lines and re.match(r"\s*[^#\s]", line))
 
 
-OWN = Rival(
+OWN_RIVAL = Rival(
     "fmu",
     "this FMU",
     "own_fmu",
@@ -173,10 +173,10 @@ OTHERS = (
         "robots and learning; a motor with a limited force serves as the friction of a joint",
     ),
 )
-RIVALS = {rival.name: rival for rival in (OWN, *OTHERS)}
+RIVALS = {rival.name: rival for rival in (OWN_RIVAL, *OTHERS)}
 
 
 def find_rivals(names: tuple[str, ...]) -> list[Rival]:
     """Return the rivals of these names, by default all. The first is the FMU, with which the others are compared."""
     check_names("rival", names, RIVALS)
-    return [rival for rival in RIVALS.values() if rival is OWN or not names or rival.name in names]
+    return [rival for rival in RIVALS.values() if rival is OWN_RIVAL or not names or rival.name in names]

@@ -7,7 +7,7 @@ from math import nan
 
 from harness.results.summary import ResultColumn, ResultTable
 
-from .catalogue import OWN, Rival
+from .catalogue import OWN_RIVAL, Rival
 from .measures import Measures
 from .scenes import SCENES, Scene, Setting
 
@@ -57,7 +57,7 @@ class Comparison:
     def time_ratio(self, result: Result) -> float:
         """Return the processor time relative to that of the FMU at its defaults in the same scene."""
         for other in self.results:
-            is_baseline = (other.rival, other.setting, other.scene) == (OWN.title, "default", result.scene)
+            is_baseline = (other.rival, other.setting, other.scene) == (OWN_RIVAL.title, "default", result.scene)
             if is_baseline and other.measures and result.measures:
                 return result.measures.seconds / other.measures.seconds
         return nan
@@ -111,8 +111,8 @@ def summary_lines(comparison: Comparison) -> Iterator[str]:
     yield (
         "error: the largest in the run, against references that share no code with the FMUs; creep: median slip in m/s "
         "or rad/s where the body sticks; lost/extra: events that the run misses or invents; late: largest error of the "
-        f"times of the others, in s; time: processor time, relative to {OWN.title} at its defaults; lines: lines of "
-        f"code that a user writes for all scenes, for {OWN.title} with its models."
+        f"times of the others, in s; time: processor time, relative to {OWN_RIVAL.title} at its defaults; lines: lines "
+        f"of code that a user writes for all scenes, for {OWN_RIVAL.title} with its models."
     )
     for rival in comparison.rivals:
         settings = "; ".join(format_setting(name, options) for name, options in rival.settings.items())
@@ -126,7 +126,7 @@ def exact_rivals(comparison: Comparison) -> list[str]:
     for result in comparison.results:
         groups.setdefault(f"{result.rival} ({result.setting})", []).append(result)
     exact = [name for name, results in groups.items() if all(map(is_exact, results))]
-    return sorted(exact, key=lambda name: name.startswith(OWN.title))
+    return sorted(exact, key=lambda name: name.startswith(OWN_RIVAL.title))
 
 
 def is_exact(result: Result) -> bool:

@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 
 from harness.results.style import BLUE, GREEN, GREY, ORANGE, WIDTH, open_figure
 
-from .catalogue import OWN, Rival
+from .catalogue import OWN_RIVAL, Rival
 from .comparison import Comparison
 from .scenes import SCENES, Scene
 
@@ -33,7 +33,7 @@ def draw(comparison: Comparison, path: Path) -> None:
             axes.set_title(f"{scene.title}, {scene.stop:g} s")
             axes.set_ylabel(f"largest error [{scene.unit}]")
         for axes in panels[-1]:
-            axes.set_xlabel(f"processor time over that of {OWN.title}")
+            axes.set_xlabel(f"processor time over that of {OWN_RIVAL.title}")
         handles = [Line2D([], [], linestyle="", label=title, **style) for title, style in styles.items()]
         figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
 
@@ -47,4 +47,4 @@ def plot_rival(axes: Any, comparison: Comparison, rival: Rival, scene: Scene, st
         axes.plot(*zip(*points, strict=True), color=style["color"], linewidth=0.8, alpha=0.6)
     for point, result in zip(points, results, strict=True):
         face = style["color"] if result.setting == "best" else "none"
-        axes.plot(*point, linestyle="", markersize=9 if rival is OWN else 6, markerfacecolor=face, **style)
+        axes.plot(*point, linestyle="", markersize=9 if rival is OWN_RIVAL else 6, markerfacecolor=face, **style)

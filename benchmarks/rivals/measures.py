@@ -50,8 +50,8 @@ def measure(scene: Scene, reference: Solution, reply: RivalReply) -> Measures:
     is_stuck = np.abs(true_states[:, 1] - true_states[:, 2]) < ROUNDING
     slip = np.abs(states[:, 1] - states[:, 2])[is_stuck]
     expected = (reference.events or []) if reply.has_modes else slip_changes(reference, scene.level)
-    missed, spurious, event_error = match_events([(t, kind) for t, kind in reply.changes], expected, scene.stop)
-    return Measures(float(error), float(np.median(slip)), missed, spurious, event_error, reply.steps, reply.seconds)
+    n_missed, n_spurious, event_error = match_events([(t, kind) for t, kind in reply.changes], expected, scene.stop)
+    return Measures(float(error), float(np.median(slip)), n_missed, n_spurious, event_error, reply.steps, reply.seconds)
 
 
 def match_events(changes: Events, expected: Events, stop: float) -> tuple[int, int, float]:
@@ -59,22 +59,22 @@ def match_events(changes: Events, expected: Events, stop: float) -> tuple[int, i
 
     Returns
     -------
-    missed, spurious : int
+    n_missed, n_spurious : int
         Number of missed events, and of spurious events.
     largest_difference : float
         Largest difference in s of the times of matched events; NaN if there are none.
     """
-    missed, spurious, differences = 0, 0, [] if expected and changes else [nan]
+    n_missed, n_spurious, differences = 0, 0, [] if expected and changes else [nan]
     for kind in {kind for _, kind in (*changes, *expected)}:
-        unmatched = [t for t, other in changes if other == kind]
+        unmatched_times = [t for t, other in changes if other == kind]
         reference_times = [t for t, other in expected if other == kind]
         window = 0.5 * min(np.diff(reference_times).min(initial=inf), stop)
         for t in reference_times:
-            nearest = min(unmatched, key=lambda other: abs(other - t), default=inf)
+            nearest = min(unmatched_times, key=lambda other: abs(other - t), default=inf)
             if abs(nearest - t) <= window:
-                unmatched.remove(nearest)
+                unmatched_times.remove(nearest)
                 differences.append(abs(nearest - t))
             else:
-                missed += 1
-        spurious += len(unmatched)
-    return missed, spurious, max(differences, default=nan)
+                n_missed += 1
+        n_spurious += len(unmatched_times)
+    return n_missed, n_spurious, max(differences, default=nan)

@@ -110,17 +110,17 @@ def main(arguments: list[str]) -> int:
     if not Path(results).is_dir() or not cases.keys() >= set(names):
         print(f"Usage: python check.py RESULTS [CASE...]; cases: {', '.join(cases)}", file=sys.stderr)
         return 2
-    failed = 0
+    n_failed = 0
     print(f"{'case':14} {'verdict':7} {'motion':10} {'outputs':10} {'events':28} rest")
     for name in names or cases:
         verdicts = check_case(folder, Path(results), name, cases[name])
         has_failed = any(verdict.startswith("-") for verdict in verdicts.values())
-        failed += has_failed
+        n_failed += has_failed
         motion, outputs, events, rest = (verdicts.get(key, "") for key in ("motion", "outputs", "events", "rest"))
         verdict = "FAILED" if has_failed else "passed"
         print(f"{name:14} {verdict:7} {motion:10} {outputs:10} {events:28} {rest}".rstrip())
-    print(f"{failed} of {len(names or cases)} cases failed")
-    return int(failed > 0)
+    print(f"{n_failed} of {len(names or cases)} cases failed")
+    return int(n_failed > 0)
 
 
 if __name__ == "__main__":

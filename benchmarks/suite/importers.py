@@ -19,7 +19,7 @@ from .check import check_case, read_columns
 
 Columns = dict[str, np.ndarray]
 Runner = Callable[["CaseFolder"], Columns]
-JOINED = 2  # communication steps that an importer joins, between which it interpolates
+JOINED_STEPS = 2  # communication steps that an importer joins, between which it interpolates
 EULER_STEPS = 10  # in a communication step
 
 
@@ -84,7 +84,7 @@ def run_adapter(importer: Importer, case: CaseFolder) -> Columns:
 
 def interpolate_across_events(case: CaseFolder) -> Columns:
     """Wrong on purpose: longer communication steps, and linear interpolation between them."""
-    coarse = run_fmpy(case, JOINED * case.step)
+    coarse = run_fmpy(case, JOINED_STEPS * case.step)
     time = case.start + case.step * np.arange(round((case.stop - case.start) / case.step) + 1)
     columns = {name: np.interp(time, coarse["time"], coarse[name]) for name in case.outputs}
     return {"time": time, **{name: np.round(y) if name == "mode" else y for name, y in columns.items()}}

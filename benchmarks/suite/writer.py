@@ -51,11 +51,11 @@ def write_suite(
     models = [str(file) for file in dict.fromkeys(case.model_file for case in cases)]
     options = [word for platform in platforms for word in ("--platform", platform)]
     for number, version in enumerate(("2", "3"), 1):
-        done = run_module(
+        process = run_module(
             "build_fmus", *models, "--native", "--fmi", version, *options, "--out", str(build / f"fmi{version}")
         )
-        if done.returncode:
-            raise HarnessError(f"the FMUs cannot be built: {(done.stderr.splitlines() or ['?'])[-1]}")
+        if process.returncode:
+            raise HarnessError(f"the FMUs cannot be built: {(process.stderr.splitlines() or ['?'])[-1]}")
         report(0.4 * number)
     for number, case in enumerate(cases, 1):
         write_case(case, folder / case.name, build)
@@ -98,27 +98,27 @@ def write_case(case: SuiteCase, folder: Path, fmus: Path) -> None:
     options = {"StartTime": start, "StopTime": stop, "StepSize": step, "RelTol": RELATIVE_TOLERANCE}
     write_rows(folder / f"{case.name}_ref.opt", [], options.items())
     (folder / "README.md").write_text(f"# {case.name}\n\n{case.catches}\n", encoding="utf-8")
-    related = [path for ending in ROLES if (path := folder / f"{case.name}_{ending}").is_file()]
+    related_files = [path for ending in ROLES if (path := folder / f"{case.name}_{ending}").is_file()]
     for version in ("fmi2", "fmi3"):
         (folder / version).mkdir(exist_ok=True)
-        embed_files(case, fmus / version / file, folder / version / file, related)
+        embed_files(case, fmus / version / file, folder / version / file, related_files)
 
 
-def embed_files(case: SuiteCase, source: Path, target: Path, related: Sequence[Path]) -> None:
+def embed_files(case: SuiteCase, source: Path, target: Path, related_files: Sequence[Path]) -> None:
     """Copy an FMU, and add the files of a case beside the certified result of its default run."""
     manifest = f"{RESULT_FOLDER}/fmi-ls-manifest.xml"
     register_namespace("fmi-ls", NAMESPACE)
     with ZipFile(source) as old:
         content = {item: old.read(item) for item in old.infolist() if item.filename != manifest}
         root = fromstring(old.read(manifest))
-    for path in related:
+    for path in related_files:
         ending = path.name.removeprefix(f"{case.name}_")
         role, text = ROLES[ending]
         SubElement(root, "Related", {"source": path.name, "role": role, "type": "text/csv", "description": text})
     with ZipFile(target, "w", ZIP_DEFLATED) as new:
         for item, data in content.items():
             new.writestr(item, data)
-        for path in related:
+        for path in related_files:
             new.write(path, f"{RESULT_FOLDER}/{path.name}")
         new.writestr(manifest, xml_bytes(root))
 

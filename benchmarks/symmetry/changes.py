@@ -86,21 +86,23 @@ class Change:
         column: np.ndarray = base.columns[name] * (self.factors.get(name, 1.0) or 1.0)
         return column
 
-    def restore_column(self, name: str, changed: "Motion") -> np.ndarray:
+    def restore_column(self, name: str, changed_motion: "Motion") -> np.ndarray:
         """Return a column of the changed run in the frame of the original one."""
         if name not in self.moving:
-            return changed.columns[name]
+            return changed_motion.columns[name]
         other, offset, speed = self.moving[name]
-        column: np.ndarray = changed.columns[other] + (offset + speed * (changed.time - changed.time[0]))
+        column: np.ndarray = changed_motion.columns[other] + (
+            offset + speed * (changed_motion.time - changed_motion.time[0])
+        )
         return column
 
-    def differ(self, name: str, expected: np.ndarray, found: np.ndarray) -> np.ndarray:
+    def differ(self, name: str, expected: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return where values (n,) of a column are not those expected; of an unknown sign, if neither sign fits."""
-        plain = expected != found
+        differences = expected != values
         if self.factors.get(name, 1.0) != 0.0:
-            return plain
-        inverted = -expected != found
-        return plain if plain.sum() <= inverted.sum() else inverted
+            return differences
+        inverted_differences = -expected != values
+        return differences if differences.sum() <= inverted_differences.sum() else inverted_differences
 
 
 def shift_start(values: Mapping[str, Any], duration: float, starts: Sequence[float] = START_TIMES) -> list[Change]:
@@ -184,26 +186,28 @@ def scale_values(
         name: 2.0 ** sum(a * b for a, b in zip(exponents, scale, strict=True))
         for name, exponents in runs.exponents.items()
     }
-    scaled = {
+    scaled_values = {
         name: values.get(name, runs.start_value(name)) * factors[name]
         for name, variable in runs.variables.items()
         if variable.causality in ("parameter", "input") and name in factors
     }
-    return {**values, **scaled}, factors
+    return {**values, **scaled_values}, factors
 
 
 def scale_units(runs: "FmuRuns", values: Mapping[str, Any], duration: float, scale: tuple[int, int, int]) -> Change:
     """Return the change of the units of mass, length and time by powers of 2."""
-    scaled, factors = scale_values(runs, values, scale)
+    scaled_values, factors = scale_values(runs, values, scale)
     seconds = 2.0 ** scale[2]
     text = "kg 2^{} m 2^{} s 2^{}".format(*scale)
-    return Change(UNITS, text, scaled, 0.0, duration * seconds, seconds, factors, is_exact=True)
+    return Change(UNITS, text, scaled_values, 0.0, duration * seconds, seconds, factors, is_exact=True)
 
 
 def invert_signs(
     runs: "FmuRuns", values: Mapping[str, Any], duration: float, odd: list[str], signs: Mapping[str, int]
 ) -> Change:
     """Return the change of all signs: those of the odd parameters, inputs and states."""
-    inverted = {name: -values.get(name, runs.start_value(name)) for name in odd}
+    inverted_values = {name: -values.get(name, runs.start_value(name)) for name in odd}
     factors = {name: float(signs.get(name, -1 if name in runs.modes else 0)) for name in runs.outputs}
-    return Change(MIRROR, "signs inverted", {**values, **inverted}, 0.0, duration, 1.0, factors, -1, is_exact=True)
+    return Change(
+        MIRROR, "signs inverted", {**values, **inverted_values}, 0.0, duration, 1.0, factors, -1, is_exact=True
+    )

@@ -85,20 +85,20 @@ def symmetry(
     tasks = [(source, backend) for source in sources for backend in (backends if source.suffix == ".py" else ("fmu",))]
     arguments = partial(build_fmu, builds), kinds or KINDS, methods, Options(max_steps=max_steps, long_run=long_run)
     with terminal.progress(len(tasks)) as report:
-        outcomes = [outcome for found in run_tasks(tasks, arguments, workers, report) for outcome in found]
+        outcomes = [outcome for group in run_tasks(tasks, arguments, workers, report) for outcome in group]
     if missing := {*methods} - {outcome.method for outcome in outcomes}:
         raise HarnessError(
             f"no model has the method {min(missing)}: give a label of solver.method, as in --method dop853"
         )
-    failed = [describe(outcome) for outcome in outcomes if outcome.difference]
+    differences = [describe(outcome) for outcome in outcomes if outcome.difference]
     cells = list_cells(count_differences(outcomes, by_method))
     blocks = [] if markdown else [make_table(cells)]
     terminal.print_result(as_data(outcomes), f"{TITLE}: runs that differ, of all", *blocks)
     if not as_json:
         rows = make_markdown(cells) if markdown else []  # rich would break long rows
-        click.echo("\n".join([*rows, *list_reasons(outcomes), *failed]))
-    if failed:
-        raise HarnessError(f"{len(failed)} of {len([o for o in outcomes if not o.reason])} runs differ")
+        click.echo("\n".join([*rows, *list_reasons(outcomes), *differences]))
+    if differences:
+        raise HarnessError(f"{len(differences)} of {len([o for o in outcomes if not o.reason])} runs differ")
 
 
 def run_tasks(

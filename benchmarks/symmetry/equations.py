@@ -44,7 +44,7 @@ class Equations:
         rates: dict[str, str] = self.model.states
         self.states = list(rates)
         self.positions = {name: rate for name, rate in rates.items() if rate in rates}  # whose rates are states
-        self.rated = [i for i, name in enumerate(self.states) if name not in self.positions]
+        self.rate_indices = [i for i, name in enumerate(self.states) if name not in self.positions]
 
     def instantiate(self, values: Mapping[str, Any]) -> Any | None:
         """Return the model with these values, or None if it refuses them."""
@@ -77,13 +77,15 @@ class Equations:
 
     def find_hidden_unit(self, runs: FmuRuns, values: Mapping[str, Any]) -> str:
         """Return why the equations do not scale with the units of the variables; empty if they do."""
-        scaled, factors = scale_values(runs, values, CHECKED_SCALE)
+        scaled_values, factors = scale_values(runs, values, CHECKED_SCALE)
         seconds = 2.0 ** CHECKED_SCALE[2]
-        original, changed = (self.instantiate(model_values(runs, each)) for each in (values, scaled))
-        if original is None or changed is None:
+        original, scaled_model = (
+            self.instantiate(model_values(runs, settings)) for settings in (values, scaled_values)
+        )
+        if original is None or scaled_model is None:
             return "the model refuses scaled values"
         units = [factors[name] for name in self.states]
-        starts = as_tuple(original.initial_state(0.0)), as_tuple(changed.initial_state(0.0))
+        starts = as_tuple(original.initial_state(0.0)), as_tuple(scaled_model.initial_state(0.0))
         for name, factor, a, b in zip(self.states, units, *starts, strict=True):
             if not is_close(b, a * factor):
                 return f"the start value of {name} is a number with a unit"
@@ -91,10 +93,10 @@ class Equations:
         for t, states, modes in self.random_points():
             rates, slips = self.evaluate(original, (t, states, modes))
             scaled_point = t * seconds, multiply(units, states), modes
-            scaled_rates, scaled_slips = self.evaluate(changed, scaled_point)
+            scaled_rates, scaled_slips = self.evaluate(scaled_model, scaled_point)
             if not (rates and scaled_rates):
                 continue
-            for a, b, i in zip(rates, scaled_rates, self.rated, strict=True):
+            for a, b, i in zip(rates, scaled_rates, self.rate_indices, strict=True):
                 if not is_close(b, a * units[i] / seconds):
                     return f"the rate of {self.states[i]} contains a number with a unit"
             for k, (a, b) in enumerate(zip(slips, scaled_slips, strict=True)):
@@ -107,12 +109,12 @@ class Equations:
 
         The parameter sets the start value of one angle and enters no equation.
         """
-        start, turn, found = model_values(runs, values), 2.0 * pi, {}
+        start, turn, angles = model_values(runs, values), 2.0 * pi, {}
         for setter in (name for name in start if getattr(runs.variables[name], "unit", None) == "rad"):
-            model, turned = self.instantiate(start), self.instantiate(start | {setter: start[setter] + turn})
-            if model is None or turned is None:
+            model, turned_model = self.instantiate(start), self.instantiate(start | {setter: start[setter] + turn})
+            if model is None or turned_model is None:
                 continue
-            starts = as_tuple(model.initial_state(0.0)), as_tuple(turned.initial_state(0.0))
+            starts = as_tuple(model.initial_state(0.0)), as_tuple(turned_model.initial_state(0.0))
             shifts = [b - a for a, b in zip(*starts, strict=True)]
             if sorted(shifts)[:-1] != [0.0] * (len(shifts) - 1) or not is_close(max(shifts), turn):
                 continue
@@ -120,11 +122,11 @@ class Equations:
             points = list(self.random_points())
             images = [(t, (*y[:place], y[place] + turn, *y[place + 1 :]), modes) for t, y, modes in points]
             if all(
-                self.are_equal(self.evaluate_all(model, a), self.evaluate_all(turned, b))
+                self.are_equal(self.evaluate_all(model, a), self.evaluate_all(turned_model, b))
                 for a, b in zip(points, images, strict=True)
             ):
-                found[self.states[place]] = setter
-        return found
+                angles[self.states[place]] = setter
+        return angles
 
     def evaluate_all(self, model: Any, point: Point) -> Numbers:
         """Return rates, slips and margins of conditions; none if they are undefined."""
@@ -155,20 +157,22 @@ class Equations:
             and not name.startswith("solver.")
             and not (variable.min is not None and float(variable.min) >= 0.0)
         ]
-        free = [self.states[i] for i in self.rated]  # a position has the sign of its speed
+        free = [self.states[i] for i in self.rate_indices]  # a position has the sign of its speed
         if len(candidates) + len(free) > MAX_CANDIDATES:
             return f"more than {MAX_CANDIDATES} variables may be odd"
         rng = random.Random(2)
         start = model_values(runs, values)
-        drawn = {name: rng.uniform(0.1, 1.0) for name in candidates}  # because zero has no sign
+        drawn_values = {name: rng.uniform(0.1, 1.0) for name in candidates}  # because zero has no sign
         points = list(self.random_points())
-        original = self.instantiate(start | drawn)
+        original = self.instantiate(start | drawn_values)
         if original is None:
             return "the model refuses random values"
         expected = [self.evaluate(original, point) for point in points]
         for parameter_signs in product((1, -1), repeat=len(candidates)):
-            inverted = {name: sign * drawn[name] for name, sign in zip(candidates, parameter_signs, strict=True)}
-            model = self.instantiate(start | inverted)
+            inverted_values = {
+                name: sign * drawn_values[name] for name, sign in zip(candidates, parameter_signs, strict=True)
+            }
+            model = self.instantiate(start | inverted_values)
             if model is None:
                 continue
             for free_signs in product((-1, 1), repeat=len(free)):
@@ -193,8 +197,8 @@ class Equations:
             found_rates, found_slips = self.evaluate(
                 model, (t, multiply(factors, states), tuple(-mode for mode in modes))
             )
-            inverted = multiply([factors[i] for i in self.rated], rates) if rates else ()
-            if not rates or found_rates != inverted or found_slips != tuple(-slip for slip in slips):
+            inverted_rates = multiply([factors[i] for i in self.rate_indices], rates) if rates else ()
+            if not rates or found_rates != inverted_rates or found_slips != tuple(-slip for slip in slips):
                 return False
         return True
 
@@ -222,9 +226,9 @@ def multiply(factors: list[float] | list[int], numbers: Numbers) -> Numbers:
     return tuple(factor * number for factor, number in zip(factors, numbers, strict=True))
 
 
-def is_close(found: float, expected: float) -> bool:
+def is_close(value: float, expected: float) -> bool:
     """Return whether two numbers are equal up to rounding."""
-    return abs(found - expected) <= ROUNDING * max(abs(found), abs(expected))
+    return abs(value - expected) <= ROUNDING * max(abs(value), abs(expected))
 
 
 def model_values(runs: FmuRuns, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -59,8 +59,10 @@ def move_frame(text: str) -> MovingFrame | None:
     if unit is None:
         return None
     speeds = [name for name, call in states.items() if units[name] == unit and find_argument(call, "rate") is None]
-    paths = [rated.id for name in speeds if isinstance(rated := find_argument(states[name], "rate_of"), ast.Name)]
-    renamed = {name: f"{name}_in_frame" for name in (*paths, *speeds)}
+    paths = [
+        rate_node.id for name in speeds if isinstance(rate_node := find_argument(states[name], "rate_of"), ast.Name)
+    ]
+    new_names = {name: f"{name}_in_frame" for name in (*paths, *speeds)}
     start_values = {}
     docstring = [node for node in statements[:1] if is_docstring(node)]
     body = (
@@ -72,8 +74,8 @@ def move_frame(text: str) -> MovingFrame | None:
     )
     for node in statements[len(docstring) :]:
         for call in (part for part in ast.walk(node) if isinstance(part, ast.Call)):
-            if isinstance(rated := find_argument(call, "rate_of"), ast.Name):
-                rated.id = renamed.get(rated.id, rated.id)
+            if isinstance(rate_node := find_argument(call, "rate_of"), ast.Name):
+                rate_node.id = new_names.get(rate_node.id, rate_node.id)
         name = assigned_name(node)
         if name in speeds:
             start = find_argument(states[name], "start")
@@ -82,14 +84,14 @@ def move_frame(text: str) -> MovingFrame | None:
                 body += ast.parse(f"{start_values[name]} = Fixed(0.0, {unit!r}, 'start value')").body
                 states[name].keywords = [keyword for keyword in states[name].keywords if keyword.arg != "start"]
                 states[name].keywords.append(ast.keyword("start", ast.Name(start_values[name], ast.Load())))
-        if name in renamed:
-            node.targets = [ast.Name(renamed[name], ast.Store())]  # type: ignore[attr-defined]
-            body += [node, *ast.parse(f"{name} = {renamed[name]} + {SPEED if name in speeds else PATH}").body]
+        if name in new_names:
+            node.targets = [ast.Name(new_names[name], ast.Store())]  # type: ignore[attr-defined]
+            body += [node, *ast.parse(f"{name} = {new_names[name]} + {SPEED if name in speeds else PATH}").body]
         else:
             body.append(node)
     model.body = body
     tree.body.insert(tree.body.index(model), *ast.parse("from fmus import Fixed, Parameter, State").body)
-    positions, velocities = ({name: renamed[name] for name in names} for names in (paths, speeds))
+    positions, velocities = ({name: new_names[name] for name in names} for names in (paths, speeds))
     return MovingFrame(ast.unparse(tree) + "\n", positions, velocities, start_values)
 
 
@@ -130,22 +132,25 @@ def order_last_first(statements: list[ast.stmt]) -> list[ast.stmt]:
 
     There are none if statements need each other.
     """
-    assigned = [find_names(statement, ast.Store) for statement in statements]
-    needed = [find_names(statement, ast.Load) for statement in statements]
-    ordered = [statement for statement in statements[:1] if is_docstring(statement)]
-    remaining = list(range(len(ordered), len(statements)))
+    assigned_names = [find_names(statement, ast.Store) for statement in statements]
+    needed_names = [find_names(statement, ast.Load) for statement in statements]
+    ordered_statements = [statement for statement in statements[:1] if is_docstring(statement)]
+    remaining = list(range(len(ordered_statements), len(statements)))
     while remaining:
         ready = [
             i
             for i in remaining
-            if not any(j != i and (assigned[j] & needed[i] or (j < i and assigned[i] & needed[j])) for j in remaining)
+            if not any(
+                j != i and (assigned_names[j] & needed_names[i] or (j < i and assigned_names[i] & needed_names[j]))
+                for j in remaining
+            )
         ]
         if not ready:
             return []
         i = max(ready)
         remaining.remove(i)
-        ordered.append(statements[i])
-    return ordered
+        ordered_statements.append(statements[i])
+    return ordered_statements
 
 
 def is_docstring(statement: ast.stmt) -> bool:

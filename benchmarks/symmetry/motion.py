@@ -49,7 +49,7 @@ class Motion:
     failure: str = ""
 
     @classmethod
-    def failed(cls, message: str) -> Self:
+    def from_failure(cls, message: str) -> Self:
         """Return a motion without points."""
         return cls(np.zeros(0), {}, np.zeros(0), np.zeros((0, 0)), {}, message)
 
@@ -153,7 +153,7 @@ class FmuRuns:
         except (HarnessError, *CALL_FAILURES) as error:
             message = self.instance.log.error_message if self.instance else ""
             self.close()
-            return Motion.failed(message or str(error))
+            return Motion.from_failure(message or str(error))
         except TooManyStepsError:
             self.close()
             raise
@@ -171,12 +171,12 @@ class FmuRuns:
         )
 
 
-def find_difference(base: Motion, changed: Motion, change: Change, states: list[str], rtol: float) -> str:
+def find_difference(base: Motion, changed_motion: Motion, change: Change, states: list[str], rtol: float) -> str:
     """Return the first difference between a motion and what it must be after a change; empty if there is none.
 
     Parameters
     ----------
-    base, changed : Motion
+    base, changed_motion : Motion
         The motion, and that after the change.
     change : Change
     states : list of str
@@ -184,29 +184,29 @@ def find_difference(base: Motion, changed: Motion, change: Change, states: list[
     rtol : float
         Relative tolerance of the method.
     """
-    if changed.failure:
-        return f"fails: {changed.failure}"
+    if changed_motion.failure:
+        return f"fails: {changed_motion.failure}"
     times = change.map_time(base.event_times)
-    n, n_changed = len(times) - 1, len(changed.event_times) - 1
+    n, n_changed = len(times) - 1, len(changed_motion.event_times) - 1
     counts = f"{n_changed} events instead of {n}" if n != n_changed else f"of {n} events"
     tolerance = 0.0
     if not change.is_exact:
         elapsed = np.maximum(base.event_times - base.event_times[0], 0.0)
         tolerance = 4 * ulp(max(abs(times[0]), abs(times[-1]))) + change.slack * rtol * elapsed
     for k in range(min(n, n_changed) + 1):
-        expected, found = change.mode_sign * base.modes[k], changed.modes[k]
-        if (expected != found).any():
-            return f"event {k} at {times[k]:.9g} s: mode {describe(found)} instead of {describe(expected)}; {counts}"
-        gap = abs(changed.event_times[k] - times[k])
+        expected, modes = change.mode_sign * base.modes[k], changed_motion.modes[k]
+        if (expected != modes).any():
+            return f"event {k} at {times[k]:.9g} s: mode {describe(modes)} instead of {describe(expected)}; {counts}"
+        gap = abs(changed_motion.event_times[k] - times[k])
         if gap > np.broadcast_to(tolerance, times.shape)[k]:
             return f"event {k} at {times[k]:.9g} s: {gap:.2g} s off; {counts}"
     if n != n_changed:
         k = min(n, n_changed) + 1
-        surplus = (changed.event_times if n_changed > n else times)[k]
+        surplus = (changed_motion.event_times if n_changed > n else times)[k]
         return f"event {k} at {surplus:.9g} s: {'one too many' if n_changed > n else 'missing'}; {counts}"
     if change.is_exact:
-        return find_changed_bits(base, changed, change)
-    return find_state_difference(base, changed, change, states, rtol)
+        return find_changed_bits(base, changed_motion, change)
+    return find_state_difference(base, changed_motion, change, states, rtol)
 
 
 def describe(modes: np.ndarray) -> str:
@@ -214,48 +214,49 @@ def describe(modes: np.ndarray) -> str:
     return ", ".join(str(mode) for mode in modes.tolist())
 
 
-def find_changed_bits(base: Motion, changed: Motion, change: Change) -> str:
+def find_changed_bits(base: Motion, changed_motion: Motion, change: Change) -> str:
     """Return the first value whose bits are not those that they must be after a change."""
     counts = ", ".join(
-        f"{changed.counts[name]} instead of {count} {name}"
+        f"{changed_motion.counts[name]} instead of {count} {name}"
         for name, count in base.counts.items()
-        if changed.counts[name] != count
+        if changed_motion.counts[name] != count
     )
-    n = min(len(base.time), len(changed.time))
+    n = min(len(base.time), len(changed_motion.time))
     expected = {"time": change.map_time(base.time)} | {name: change.map_column(name, base) for name in base.columns}
-    found = {"time": changed.time} | changed.columns
+    columns = {"time": changed_motion.time} | changed_motion.columns
     rows = {
         name: int(np.argmax(unequal))
         for name in expected
-        if (unequal := change.differ(name, expected[name][:n], found[name][:n])).any()
+        if (unequal := change.differ(name, expected[name][:n], columns[name][:n])).any()
     }
     if rows:
         name = min(rows, key=lambda name: rows[name])
         row = rows[name]
-        difference = abs(found[name][row] - expected[name][row]) / max(np.abs(expected[name]).max(), 5e-324)
+        difference = abs(columns[name][row] - expected[name][row]) / max(np.abs(expected[name]).max(), 5e-324)
         text = f"{name} at {expected['time'][row]:.9g} s: bits differ, by {difference:.1g} of its largest value"
         return f"{text}; {counts}" if counts else text
-    return counts or ("" if len(base.time) == len(changed.time) else "another number of points")
+    return counts or ("" if len(base.time) == len(changed_motion.time) else "another number of points")
 
 
-def find_state_difference(base: Motion, changed: Motion, change: Change, states: list[str], rtol: float) -> str:
+def find_state_difference(base: Motion, changed_motion: Motion, change: Change, states: list[str], rtol: float) -> str:
     """Return the first state that is not, within the tolerance, what it must be after a change."""
     points = np.linspace(base.time[0], base.time[-1], N_SAMPLES + 1)
     rows = np.abs(base.time[:, None] - points).argmin(axis=0)
     times = change.map_time(base.time[rows])
-    changed_rows = np.abs(changed.time[:, None] - times).argmin(axis=0)
+    changed_rows = np.abs(changed_motion.time[:, None] - times).argmin(axis=0)
     for name in states:
         expected = change.map_column(name, base)
-        found = change.restore_column(name, changed)
+        column = change.restore_column(name, changed_motion)
         other = change.moving[name][0] if name in change.moving else name
-        computed = found if other == name else changed.columns.get(other, found)  # in a frame, from larger values
-        size = max(np.abs(expected).max(), np.abs(computed).max())
+        # in a frame, from larger values
+        computed_column = column if other == name else changed_motion.columns.get(other, column)
+        size = max(np.abs(expected).max(), np.abs(computed_column).max())
         if size == 0.0:
             continue
         rate = np.abs(np.diff(expected) / np.maximum(np.diff(base.time), 1e-300)).max() if len(expected) > 1 else 0.0
         elapsed = 1.0 + (base.time[rows] - base.time[0]) / (base.time[-1] - base.time[0])
         tolerance = 8 * ulp(np.abs(times).max()) * rate + change.slack * rtol * size * elapsed
-        error = np.abs(found[changed_rows] - expected[rows])
+        error = np.abs(column[changed_rows] - expected[rows])
         if (error > tolerance).any():
             k = int(np.argmax(error > tolerance))
             return f"{name} at {times[k]:.9g} s: {error[k] / size:.2g} of its largest value off"

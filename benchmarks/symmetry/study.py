@@ -112,7 +112,7 @@ def run_shortened(runs: FmuRuns, values: Mapping[str, Any], max_steps: int) -> t
             return runs.run(values, 0.0, duration, max_steps), duration
         except TooManyStepsError as error:
             duration = floor(0.8 * error.share * duration / TIME_UNIT) * TIME_UNIT
-    return Motion.failed(f"it needs more than {max_steps} steps for {duration} s"), duration
+    return Motion.from_failure(f"it needs more than {max_steps} steps for {duration} s"), duration
 
 
 def effective_rtol(runs: FmuRuns, values: Mapping[str, Any]) -> float:
@@ -226,8 +226,8 @@ class Model:
                 continue
             for runs, change in changes:
                 try:
-                    changed = runs.run(change.values, change.start, change.stop, 4 * self.options.max_steps)
-                    difference = find_difference(base, changed, change, states, rtol)
+                    changed_motion = runs.run(change.values, change.start, change.stop, 4 * self.options.max_steps)
+                    difference = find_difference(base, changed_motion, change, states, rtol)
                 except TooManyStepsError as error:
                     difference = f"stalls: {error}"
                 yield outcome(kind, change.text, difference)
@@ -284,9 +284,9 @@ class Model:
                 return "no start value is an angle that enters the equations by periodic functions only"
             return [(runs, change) for change in add_revolutions(runs, values, duration, angles)]
         if kind == UNITS:
-            hidden = self.equations.find_hidden_unit(runs, values)
-            if hidden:
-                return f"not scalable: {hidden}"
+            hidden_unit = self.equations.find_hidden_unit(runs, values)
+            if hidden_unit:
+                return f"not scalable: {hidden_unit}"
             return [(runs, scale_units(runs, values, duration, scale)) for scale in self.options.scales]
         odd = self.equations.find_odd_variables(runs, values)
         return odd if isinstance(odd, str) else [(runs, invert_signs(runs, values, duration, *odd))]

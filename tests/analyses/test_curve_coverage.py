@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from benchmarks.campaigns.curve_coverage import DRAWN, check_record
+from benchmarks.campaigns.curve_coverage import DRAWN_LAWS, check_record
 
-RECORDS = 2 * len(DRAWN)
+RECORDS = 2 * len(DRAWN_LAWS)
 
 
 @pytest.mark.campaign

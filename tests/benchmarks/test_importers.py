@@ -108,7 +108,7 @@ def test_a_crash_or_timeout_affects_only_its_own_check(make_module, monkeypatch)
         try:
             answer = checks.run_request(tool, request)
             versions[name] = answer.reply.version, answer.stderr
-            processes.append(answer.reply.accepted)
+            processes.append(answer.reply.n_accepted)
         except CheckFailedError as wrong:
             versions[name] = str(wrong)
     endings = {

@@ -12,7 +12,7 @@ import pytest
 from build_cache import build_once
 
 from benchmarks.rivals import child, study
-from benchmarks.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN, RIVALS, count_lines
+from benchmarks.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN_RIVAL, RIVALS, count_lines
 from benchmarks.rivals.child import RivalCase, RivalReply, run_case
 from benchmarks.rivals.comparison import Comparison, Result, exact_rivals, gap_lines, rivals_table
 from benchmarks.rivals.measures import match_events, measure
@@ -91,7 +91,7 @@ def test_our_fmus_are_exact_in_all_scenes(references, fmus, tmp_path, monkeypatc
     (tmp_path / "fmus" / "more").symlink_to(build_once("belt", "clutch"))
     monkeypatch.chdir(tmp_path)
     for name, scene in SCENES.items():
-        measures = measure(scene, references[name], run_case(RivalCase(OWN.module, name, OWN.best)))
+        measures = measure(scene, references[name], run_case(RivalCase(OWN_RIVAL.module, name, OWN_RIVAL.best)))
         assert measures.error < 1e-9, name
         assert (measures.creep, measures.missed, measures.spurious) == (0.0, 0, 0), name
 
@@ -107,7 +107,7 @@ def test_lines_of_code_are_counted_without_blank_lines_comments_and_docstrings()
     source = '"""Title.\n\nMore."""\n\nimport os  # in\n\n# out\ndef f():\n    """Out."""\n    return os\n'
     assert count_lines(source) == 3
     n_own_lines = count_lines((ENGINES / "own_fmu.py").read_text(encoding="utf-8"))
-    assert OWN.lines > n_own_lines + 100  # with its models
+    assert OWN_RIVAL.lines > n_own_lines + 100  # with its models
     assert RIVALS["scipy"].lines == count_lines((ENGINES / "scipy.py").read_text(encoding="utf-8"))
 
 
@@ -209,7 +209,7 @@ def test_the_command_writes_a_table_a_figure_and_the_gaps(user_folder, tmp_path,
 
 def reply_of_reference(request):
     """The reply of an exact engine; one setting gives no result."""
-    if request.module == OWN.module and request.setting:
+    if request.module == OWN_RIVAL.module and request.setting:
         return RivalReply("it fell over")
     reference = compute_reference_motion(SCENES[request.scene])
     return RivalReply("", reference.states[::FINE].tolist(), True, reference.events, 5, 0.5)
@@ -217,7 +217,7 @@ def reply_of_reference(request):
 
 def test_other_exact_rivals_are_named_before_ours():
     measures = measure(SCENES["held"], compute_reference_motion(SCENES["held"]), RivalReply("", [[0.0] * 3] * 51, True))
-    results = [Result(title, "1", "best", {}, "held", 1, measures) for title in (OWN.title, "scipy", "MuJoCo")]
+    results = [Result(title, "1", "best", {}, "held", 1, measures) for title in (OWN_RIVAL.title, "scipy", "MuJoCo")]
     results.append(replace(results[2], setting="default", measures=replace(measures, error=0.1)))
-    comparison = Comparison((OWN,), tuple(results))
-    assert exact_rivals(comparison) == ["scipy (best)", "MuJoCo (best)", f"{OWN.title} (best)"]
+    comparison = Comparison((OWN_RIVAL,), tuple(results))
+    assert exact_rivals(comparison) == ["scipy (best)", "MuJoCo (best)", f"{OWN_RIVAL.title} (best)"]

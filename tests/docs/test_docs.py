@@ -44,7 +44,7 @@ def load(name):
 def runnable(page):
     """Whether a page has a block that runs."""
     return any(
-        block.language in scripts.RUN and not block.title and not block.skipped
+        block.language in scripts.RUN and not block.title and not block.skip_reason
         for block in scripts.find_blocks((DOCS / page).read_text(encoding="utf-8"))
     )
 
@@ -208,7 +208,9 @@ def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
     for page in PAGES:
         for block in scripts.find_blocks((DOCS / page).read_text(encoding="utf-8")):
             assert block.language, f"{page}, line {block.line}: the block has no language"
-            assert not block.skipped or len(block.skipped.split()) >= 3, f"{page}, line {block.line}: give a reason"
+            assert not block.skip_reason or len(block.skip_reason.split()) >= 3, (
+                f"{page}, line {block.line}: give a reason"
+            )
 
 
 SEEDS = {  # arguments; others have fixed seeds

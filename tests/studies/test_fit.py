@@ -66,7 +66,7 @@ def fit_drawn(name, seed, max_samples):
         record.free,
         observe=group.outputs,
         inputs=[*record.inputs],
-        values=record.fixed,
+        values=record.fixed_values,
     )
     return record, fit
 

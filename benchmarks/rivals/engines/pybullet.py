@@ -31,8 +31,8 @@ def simulate(scene: Scene, setting: Setting) -> Solution:
     )
     x, v, w = scene.start
     for i, inertia in enumerate(inertias):
-        undamped = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
-        bullet.changeDynamics(body, i, localInertiaDiagonal=[inertia] * 3, **undamped)
+        zero_damping = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
+        bullet.changeDynamics(body, i, localInertiaDiagonal=[inertia] * 3, **zero_damping)
         bullet.setJointMotorControl2(body, i, bullet.VELOCITY_CONTROL, force=0.0)
         bullet.resetJointState(body, i, 0.0 if i else x, w - v if i else v if moves else v - w)
     bullet.setPhysicsEngineParameter(**options)
