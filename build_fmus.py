@@ -285,8 +285,8 @@ def temporary_files() -> Iterator[None]:
     """
     os.environ.setdefault("HOME", tempfile.gettempdir())
     with tempfile.TemporaryDirectory(prefix="fmu-build-") as directory:
-        former, tempfile.tempdir = tempfile.tempdir, directory
+        former_folder, tempfile.tempdir = tempfile.tempdir, directory
         try:
             yield
         finally:
-            tempfile.tempdir = former
+            tempfile.tempdir = former_folder

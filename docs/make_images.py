@@ -211,7 +211,7 @@ def draw_laws(folder: Path) -> None:
     v = np.linspace(-1, 1, 801)
     z = B * v
     magic = mu_s * np.sin(C * np.arctan(z - E * (z - np.arctan(z))))
-    sliding = {side: ([0, side], [side * mu_d] * 2) for side in (-1, 1)}
+    sliding_curves = {side: ([0, side], [side * mu_d] * 2) for side in (-1, 1)}
     style = {"font.size": 9, "svg.fonttype": "path", "svg.hashsalt": "friction", "axes.titlelocation": "left"}
     style |= {"axes.titlesize": 9, "axes.grid": True, "grid.color": "#dddddd"}
     with plt.rc_context(style):
@@ -220,7 +220,7 @@ def draw_laws(folder: Path) -> None:
         for axis, title in zip(axes, titles, strict=True):
             axis.set(title=title, xlabel="relative speed", xticks=[0], ylim=(-1.1, 1.1))
             if title != "magic formula":
-                for x, y in sliding.values():
+                for x, y in sliding_curves.values():
                     gap = 0.08 if title.startswith("threshold") else 0.0
                     axis.plot([x[0] + gap * np.sign(x[1]), x[1]], y, color="#0072B2", lw=2)
         axes[0].plot([0, 0], [-mu_s, mu_s], color="#009E73", lw=3, label="stuck")

@@ -31,11 +31,11 @@ class PulledBlock(HybridProblem):
         """Return the force of the spring."""
         return self.k * (self.v_driver * t - x)
 
-    def holding(self) -> float:
+    def holding_force(self) -> float:
         """Return the largest friction force at rest."""
         return self.mu_s * self.m * G
 
-    def sliding(self, speed: float) -> float:
+    def sliding_force(self, speed: float) -> float:
         """Return the friction force at a speed."""
         return self.mu_d * self.m * G
 
@@ -44,11 +44,11 @@ class PulledBlock(HybridProblem):
         x, v = y
         if modes[0] == 0:
             return [0.0, 0.0]
-        return [v, (self.force(t, x) - modes[0] * self.sliding(abs(v))) / self.m]
+        return [v, (self.force(t, x) - modes[0] * self.sliding_force(abs(v))) / self.m]
 
     def contacts(self, t: float, y: StateVector, modes: list[int]) -> list[tuple[float, float, float]]:
         """Return the velocity, the force of the spring and the largest friction force at rest."""
-        return [(y[1], self.force(t, y[0]), self.holding())]
+        return [(y[1], self.force(t, y[0]), self.holding_force())]
 
     def stop_slip(self, y: np.ndarray, modes: list[int]) -> None:
         """Set the speed of a stuck block to zero."""
@@ -63,11 +63,11 @@ class StribeckSled(PulledBlock):
     m, k, v_driver = 12.5, 742.5, 0.034
     f_s, f_d, v_s = 105.0, 62.0, 0.15
 
-    def holding(self) -> float:
+    def holding_force(self) -> float:
         """Return the largest friction force at rest."""
         return self.f_s
 
-    def sliding(self, speed: float) -> float:
+    def sliding_force(self, speed: float) -> float:
         """Return the friction force at a speed."""
         return self.f_d + (self.f_s - self.f_d) * exp(-speed / self.v_s)
 

@@ -62,13 +62,11 @@ def unknown_name_message(category: str, name: object, allowed_names: Iterable[st
     allowed_names : iterable of str
         The valid names.
     """
-    sorted_names, quoted_name = sorted(allowed_names), format_value(name)
-    close = get_close_matches(quoted_name.strip("'"), sorted_names, n=1)
+    names, quoted_name = sorted(allowed_names), format_value(name)
+    close = get_close_matches(quoted_name.strip("'"), names, n=1)
     hint = f" (nearest: '{close[0]}')" if close else ""
-    more = f" and {len(sorted_names) - MAX_LISTED_NAMES} more" if len(sorted_names) > MAX_LISTED_NAMES else ""
-    return (
-        f"unknown {category} {quoted_name}{hint}; allowed: {', '.join(sorted_names[:MAX_LISTED_NAMES]) or 'none'}{more}"
-    )
+    suffix = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
+    return f"unknown {category} {quoted_name}{hint}; allowed: {', '.join(names[:MAX_LISTED_NAMES]) or 'none'}{suffix}"
 
 
 def unknown_source_message(category: str, source: str, allowed_names: Iterable[str], other: str = "") -> str:

@@ -76,7 +76,7 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
     """
 
     def figures() -> Measurement:
-        ratio, baselines, missing = 0.0, [], set()
+        ratio, baselines, missing_tools = 0.0, [], set()
         for rtol in tolerances:
             errors = {
                 "CVODE in C": largest_error_of(scene, run_cvode(scene, rtol)),
@@ -85,7 +85,7 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
             try:
                 errors["fmusim"] = largest_error_of(scene, run_fmusim(scene, rtol))
             except MissingToolError as reason:
-                missing.add(Baseline(str(reason)))
+                missing_tools.add(Baseline(str(reason)))
             reference_error, *others = errors.values()
             ratio = max(ratio, *(error / reference_error for error in others))
             if scene.is_default:
@@ -94,7 +94,7 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
                 )
             text = ", ".join(f"{name} {error:.1e}" for name, error in errors.items())
             baselines.append(Baseline(f"errors at rtol {rtol:.0e}: {text}"))
-        return ratio, 3.0, (*baselines, *missing)
+        return ratio, 3.0, (*baselines, *missing_tools)
 
     return measure_or_skip(f"{scene}, model exchange: largest error, ratio to CVODE in C", "1", figures)
 

@@ -50,8 +50,8 @@ class Scenario:
     def segments(self) -> list[InputSegment]:
         """Return the linear segments of the driven input, or one segment of zero."""
         times, values = self.run.inputs.values() or ((self.start, self.stop), (0.0, 0.0))
-        between = pairwise(zip(times, values, strict=True))
-        return [(t, end, value, (last - value) / (end - t)) for (t, value), (end, last) in between if end > t]
+        point_pairs = pairwise(zip(times, values, strict=True))
+        return [(t, end, value, (last - value) / (end - t)) for (t, value), (end, last) in point_pairs if end > t]
 
     @property
     def has_ramps(self) -> bool:

@@ -43,8 +43,8 @@ def run_campaign(name: str) -> tuple[int, float, str]:
 
 def main(names: list[str]) -> int:
     """Run the campaigns of these names, or all; return the exit status."""
-    if unknown := [name for name in names if name not in CAMPAIGNS]:
-        print(f"Error: there is no campaign {unknown[0]!r}; choose from {', '.join(CAMPAIGNS)}", file=sys.stderr)
+    if unknown_names := [name for name in names if name not in CAMPAIGNS]:
+        print(f"Error: there is no campaign {unknown_names[0]!r}; choose from {', '.join(CAMPAIGNS)}", file=sys.stderr)
         return 2
     FOLDER.mkdir(parents=True, exist_ok=True)
     print(f"{'campaign':20} {'status':>6} {'CPU':>8}  last line", flush=True)

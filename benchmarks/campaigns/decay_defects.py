@@ -73,8 +73,8 @@ def check_record(task):
         return number, defect, None, 0.0, str(refusal)
     by_name = {estimate.name: estimate for estimate in fit.estimates}
     coverage = [by_name[name].low <= true_values[name] <= by_name[name].high for name in NAMES]
-    far = max(abs(by_name[name].value - true_values[name]) / by_name[name].error for name in NAMES)
-    return number, defect, coverage, far, " ".join(fit.remarks)
+    largest_error = max(abs(by_name[name].value - true_values[name]) / by_name[name].error for name in NAMES)
+    return number, defect, coverage, largest_error, " ".join(fit.remarks)
 
 
 def table_lines(rows):
@@ -86,17 +86,17 @@ def table_lines(rows):
         group = [row for row in rows if defect in ("all", row[1])]
         coverage = [row[2] for row in group if row[2] is not None]
         shares = np.mean(coverage, axis=0) if coverage else np.full(len(NAMES), np.nan)
-        silent = sum(row[2] is not None and row[3] > FAR and not row[4] for row in group)
+        n_silent = sum(row[2] is not None and row[3] > FAR and not row[4] for row in group)
         yield (
             f"{defect:12} {len(coverage):7} {len(group) - len(coverage):7} "
             + " ".join(f"{share:6.3f}" for share in (*shares, shares.mean()))
-            + f" {silent:7}"
+            + f" {n_silent:7}"
         )
-    for number, defect, coverage, far, text in rows:
+    for number, defect, coverage, largest_error, text in rows:
         if coverage is None:
             yield f"record {number} ({defect}) refused: {text}"
-        elif far > FAR:
-            yield f"record {number} ({defect}) off by {far:.1f} errors: {text or 'no remark'}"
+        elif largest_error > FAR:
+            yield f"record {number} ({defect}) off by {largest_error:.1f} errors: {text or 'no remark'}"
 
 
 if __name__ == "__main__":
@@ -109,4 +109,4 @@ if __name__ == "__main__":
             rows.append(row)
     print(*table_lines(rows), sep="\n")
     fitted_rows = [row for row in rows if row[2] is not None and row[1] != "loss"]
-    sys.exit(any(far > FAR and not remarks for _, _, _, far, remarks in fitted_rows))
+    sys.exit(any(largest_error > FAR and not remarks for _, _, _, largest_error, remarks in fitted_rows))

@@ -43,5 +43,7 @@ if __name__ == "__main__":
             averaged_times.append(processor_time(record, thresholds.MAX_DENSE_SAMPLES))
             if samples <= MOST_UNTHINNED:
                 unaveraged_times.append(processor_time(record, samples))
-        now, before = (f"{min(times):.1f} s" if times else "-" for times in (averaged_times, unaveraged_times))
-        print(f"{samples:9} {now:>7} {before:>18}", flush=True)
+        averaged_text, unaveraged_text = (
+            f"{min(times):.1f} s" if times else "-" for times in (averaged_times, unaveraged_times)
+        )
+        print(f"{samples:9} {averaged_text:>7} {unaveraged_text:>18}", flush=True)

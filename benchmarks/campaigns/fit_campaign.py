@@ -121,15 +121,15 @@ def print_summary(rows):
         if not part:
             continue
         fits = [row for row in part if "refused" not in row]
-        partly = [row for row in fits if not all(map(isfinite, row["errors"].values()))]
+        partial_rows = [row for row in fits if not all(map(isfinite, row["errors"].values()))]
         found_rows = [row for row in fits if is_found(row)]
-        silent = [row for row in fits if not is_found(row) and not row["remarks"]]
+        silent_rows = [row for row in fits if not is_found(row) and not row["remarks"]]
         remarked_rows = [row for row in fits if row["remarks"]]
         inputs = [row for row in remarked_rows if any(remark.startswith("The inputs") for remark in row["remarks"])]
         seconds = [row["seconds"] for row in part]
         print(
-            f"{name:23}{len(part):7} {len(part) - len(fits):7} {len(partly):6} {len(found_rows):4}/{len(fits):<4}"
-            f"{len(silent):6} {len(remarked_rows):8} {len(inputs):6} {coverage(fits):23}{np.median(seconds):7.2f} "
+            f"{name:23}{len(part):7} {len(part) - len(fits):7} {len(partial_rows):6} {len(found_rows):4}/{len(fits):<4}"
+            f"{len(silent_rows):6} {len(remarked_rows):8} {len(inputs):6} {coverage(fits):23}{np.median(seconds):7.2f} "
             f"{max(seconds):7.2f}"
         )
 

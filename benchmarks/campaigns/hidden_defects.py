@@ -172,7 +172,7 @@ def check_record(task):
         estimates, ranges, remarks = KINDS[kind](np.random.default_rng((number, len(kind))), kind)
     except HarnessError as refusal:
         return kind, number, None, [], str(refusal)
-    coverage, far = [], []
+    coverage, far_values = [], []
     for estimate in estimates:
         name = estimate.name.rstrip("+-")
         if name not in ranges or not estimate.low <= estimate.high or np.isnan(ranges[name]).any():  # or no interval
@@ -180,8 +180,10 @@ def check_record(task):
         low, high = min(ranges[name]), max(ranges[name])
         coverage.append(estimate.low <= high and low <= estimate.high)
         if max(estimate.low - high, low - estimate.high) > (estimate.high - estimate.low) / 2:
-            far.append(f"{estimate.name} {estimate.value:.4g} [{estimate.low:.4g}, {estimate.high:.4g}] for {low:.4g}")
-    return kind, number, coverage, far, " ".join(remarks)
+            far_values.append(
+                f"{estimate.name} {estimate.value:.4g} [{estimate.low:.4g}, {estimate.high:.4g}] for {low:.4g}"
+            )
+    return kind, number, coverage, far_values, " ".join(remarks)
 
 
 def table_lines(rows):
@@ -189,14 +191,17 @@ def table_lines(rows):
     for kind in dict.fromkeys(row[0] for row in rows):
         group = [row for row in rows if row[0] == kind]
         coverage = [value for row in group for value in row[2] or ()]
-        silent = sum(bool(row[3]) and not row[4] for row in group)
-        far, remark = sum(bool(row[3]) for row in group), sum(row[2] is not None and bool(row[4]) for row in group)
+        n_silent = sum(bool(row[3]) and not row[4] for row in group)
+        n_far, n_remarked = (
+            sum(bool(row[3]) for row in group),
+            sum(row[2] is not None and bool(row[4]) for row in group),
+        )
         n_refused = sum(row[2] is None for row in group)
         share = np.mean(coverage) if coverage else np.nan
-        yield f"{kind:14} {len(group):7} {n_refused:7} {share:7.3f} {far:5} {silent:7} {remark:7}"
-    for kind, number, _, far, remarks in rows:
-        if far:
-            yield f"{kind} {number}: {', '.join(far)}: {remarks or 'NO REMARK'}"
+        yield f"{kind:14} {len(group):7} {n_refused:7} {share:7.3f} {n_far:5} {n_silent:7} {n_remarked:7}"
+    for kind, number, _, far_values, remarks in rows:
+        if far_values:
+            yield f"{kind} {number}: {', '.join(far_values)}: {remarks or 'NO REMARK'}"
 
 
 if __name__ == "__main__":
@@ -204,5 +209,5 @@ if __name__ == "__main__":
     with ProcessPoolExecutor(2) as pool:
         rows = [*pool.map(check_record, [(kind, number) for kind in kinds for number in range(count)], chunksize=4)]
     print(*table_lines(rows), sep="\n")
-    silent = sum(bool(far) and not remarks for _, _, _, far, remarks in rows)
-    sys.exit(silent > 0.01 * len(rows))
+    n_silent = sum(bool(far_values) and not remarks for _, _, _, far_values, remarks in rows)
+    sys.exit(n_silent > 0.01 * len(rows))

@@ -162,7 +162,7 @@ class Solution:
         i = bisect_right(self.events, t, key=lambda event: event[0]) - 1
         modes = self.events[i][1] if i >= 0 else self.first_modes
         free = self.free[bisect_right(self.free, t, key=lambda change: change[0]) - 1][1]
-        return tuple(None if none else mode for mode, none in zip(modes, free, strict=True))
+        return tuple(None if is_free else mode for mode, is_free in zip(modes, free, strict=True))
 
     def decided_until(self, bound):
         """Return the time of the first decision with a margin below `bound`, and that decision."""
@@ -413,9 +413,9 @@ class _Run:
         for g, root in zip(guards, roots, strict=True):
             if g.kind == "load":
                 continue
-            values, rising = g.value(s), np.flatnonzero(g.slope(s) > 0.0)
-            if root == end and len(rising) and rising[0]:
-                j = rising[0]
+            values, rising_points = g.value(s), np.flatnonzero(g.slope(s) > 0.0)
+            if root == end and len(rising_points) and rising_points[0]:
+                j = rising_points[0]
                 low = brentq(g.slope, s[j - 1], s[j], xtol=1e-16)
                 self.note("crossing", g.contact, -g.value(low), g.kind, self.t + end)
             elif root > end and values[0] > TIE * g.scale and values.min() < 0.0:
@@ -423,10 +423,10 @@ class _Run:
 
     # ---- modes after an event
 
-    def resolve(self, arriving, at_limit=frozenset()):
+    def resolve(self, arrivals, at_limit=frozenset()):
         """Choose the modes by trying all combinations of the contacts at rest.
 
-        `arriving` are the contacts whose slips have just reached zero, `at_limit` those whose loads have just reached
+        `arrivals` are the contacts whose slips have just reached zero, `at_limit` those whose loads have just reached
         their limits.  Of the consistent combinations, the one with the most contacts held is chosen.  Of several, the
         one that holds the most contacts that have been stuck below their limits: their loads have not changed, so they
         do not let go by themselves.
@@ -440,7 +440,7 @@ class _Run:
             i
             for i, mode in enumerate(self.modes)
             if not free[i]
-            and (abs(slips[i]) <= TIE * self.largest_slip[i] or (not at_start and (mode == 0 or i in arriving)))
+            and (abs(slips[i]) <= TIE * self.largest_slip[i] or (not at_start and (mode == 0 or i in arrivals)))
         ]  # fmt: skip
         for i, mode in enumerate(self.modes):
             if i not in rest and (at_start or mode == 0 or (mode * slips[i] < 0.0 and not free[i])):
@@ -461,7 +461,7 @@ class _Run:
             raise UnsolvableError(f"no consistent modes at {self.t}")
         n_held, n_below_limit, modes, verdicts = max(good, key=lambda candidate: candidate[:2])
         best = [
-            candidate for candidate in good if candidate[0] == n_held and (candidate[1] == n_below_limit or arriving)
+            candidate for candidate in good if candidate[0] == n_held and (candidate[1] == n_below_limit or arrivals)
         ]
         if len(best) > 1:
             self.solution.decisions.append(Decision(self.t, "choice", -1, 0.0))
@@ -469,7 +469,7 @@ class _Run:
         for other_n_held, other_n_below_limit, _, others in trials:
             if (
                 other_n_held >= n_held
-                and (other_n_below_limit >= n_below_limit or arriving)
+                and (other_n_below_limit >= n_below_limit or arrivals)
                 and not all(ok for ok, _ in others)
             ):
                 margin = min(margin, max(size for ok, size in others if not ok))
@@ -507,11 +507,11 @@ class _Run:
                 row = self.rows[i]
                 scale = self.force_scale * (row * self.inverse_masses @ row) * self.time_scale
                 slip = modes[i] * series.slip[1:, i] * weights[1:] / scale
-                first = leading(slip)
+                first = leading_coefficient(slip)
                 verdicts.append((first > 0.0, abs(first)))
             else:
                 sides = [
-                    leading((series.hold[:, i] + side * series.force[:, i]) * weights / self.force_scale)
+                    leading_coefficient((series.hold[:, i] + side * series.force[:, i]) * weights / self.force_scale)
                     for side in (1, -1)
                 ]
                 ok = min(sides) >= 0.0
@@ -536,7 +536,7 @@ def applied_scale(run, slide):
     )
 
 
-def leading(coefficients):
+def leading_coefficient(coefficients):
     """Return the first coefficient that is not a rounding error, or 0."""
     for c in coefficients:
         if abs(c) > TIE:

@@ -123,8 +123,8 @@ def exchange_errors(
         return np.inf, np.inf
     along = end["x"] * cos(turn) + end["y"] * sin(turn) - x
     across = end["y"] * cos(turn) - end["x"] * sin(turn) - y
-    late = abs(end["events.t_last"] / time - 1.0) * (1.0 - F / f)
-    return late / rtol, hypot(along, across) / (speed * time) / rtol
+    time_error = abs(end["events.t_last"] / time - 1.0) * (1.0 - F / f)
+    return time_error / rtol, hypot(along, across) / (speed * time) / rtol
 
 
 def exchange(fmu: str | Path, values: dict[str, float], stop: float, rtol: float, inputs: Any = None) -> np.ndarray:
@@ -291,9 +291,13 @@ def compare(fmu: str | Path, motion: DrivenMotion) -> str:
     times = [float(t) for t in run.events.t if t > 0.0]
     if len(times) != len(events):
         return f"{len(times)} events instead of {len(events)}"
-    late = max((abs(a - b) for a, b in zip(times, events, strict=True)), default=0.0)
-    away = max(abs(run["x"][-1] - y[0]), abs(run["y"][-1] - y[1]))
-    return f"events off by {late:.1e} s, position by {away:.1e} m" if max(late, away) > MAX_DRIVEN_ERROR else ""
+    time_error = max((abs(a - b) for a, b in zip(times, events, strict=True)), default=0.0)
+    position_error = max(abs(run["x"][-1] - y[0]), abs(run["y"][-1] - y[1]))
+    return (
+        f"events off by {time_error:.1e} s, position by {position_error:.1e} m"
+        if max(time_error, position_error) > MAX_DRIVEN_ERROR
+        else ""
+    )
 
 
 def compare_exchange(fmu: str | Path, motion: DrivenMotion, rtol: float) -> str:
@@ -305,10 +309,12 @@ def compare_exchange(fmu: str | Path, motion: DrivenMotion, rtol: float) -> str:
     times = [float(t) for t in run.events.t if t > 0.0]
     if len(times) != end["events.count"]:
         return f"{end['events.count']} events in model exchange instead of {len(times)}"
-    late = abs(end["events.t_last"] - times[-1]) if times else 0.0
-    away = max(abs(run["x"][-1] - end["x"]), abs(run["y"][-1] - end["y"]))
-    is_off = max(late, away) > MAX_DRIVEN_EXCHANGE_ERROR * rtol
-    return f"last event off by {late:.1e} s in model exchange, position by {away:.1e} m" if is_off else ""
+    time_error = abs(end["events.t_last"] - times[-1]) if times else 0.0
+    position_error = max(abs(run["x"][-1] - end["x"]), abs(run["y"][-1] - end["y"]))
+    is_off = max(time_error, position_error) > MAX_DRIVEN_EXCHANGE_ERROR * rtol
+    return (
+        f"last event off by {time_error:.1e} s in model exchange, position by {position_error:.1e} m" if is_off else ""
+    )
 
 
 # ---- campaign

@@ -192,13 +192,13 @@ def make_expected(solution, changed_solutions, times, size, rtol, has_ties):
         past_events = [n for n, (s, _) in enumerate(events) if s <= t]
         changes = [solution.first_modes, *(modes for s, modes in solution.events if s <= t)]
         # a contact that reverses with its load at the limit may stick for a moment
-        most = sum(sum(abs(a - b) for a, b in zip(x, y, strict=True)) for x, y in itertools.pairwise(changes))
+        max_count = sum(sum(abs(a - b) for a, b in zip(x, y, strict=True)) for x, y in itertools.pairwise(changes))
         result.rows.append(
             (
                 t,
                 solution.modes(t),
                 len(past_events),
-                most if has_ties else len(past_events),
+                max_count if has_ties else len(past_events),
                 float(events[past_events[-1]][0]) if past_events else 0.0,
                 kink * time_errors[past_events[-1]] if past_events else 0.0,
                 state,
@@ -279,21 +279,22 @@ def compare(rows, message, times, expected, structure):
     """Return kind, time and text of the first difference, or None."""
     n = len(structure.contacts)
     by_time = dict(zip(times, rows, strict=False))
-    for t, modes, least, most, last, time_error, state, error in expected.rows:
+    for t, modes, min_count, max_count, last, time_error, state, error in expected.rows:
         if t not in by_time:
             return "error", t, message
         row = by_time[t]
         factor = max(1.0, row[-2] / MANY_STEPS)
         count, t_last, states = row[n], row[n + 1], np.array(row[n + 2 : n + 2 + len(state)])
-        if not least <= count <= most:
+        if not min_count <= count <= max_count:
             return (
                 "count",
                 t,
-                f"{count} events, expected {least}{f' to {most}' if most > least else ''}; last {t_last!r}",
+                f"{count} events, expected {min_count}{f' to {max_count}' if max_count > min_count else ''}; "
+                f"last {t_last!r}",
             )
         if any(b is not None and a != b for a, b in zip(row, modes, strict=False)):
             return "modes", t, f"modes {tuple(row[:n])}, expected {modes}"
-        if least and abs(t_last - last) > factor * time_error:
+        if min_count and abs(t_last - last) > factor * time_error:
             return "time", t, f"event at {t_last!r}, expected {last!r} +- {time_error:.1e}"
         worst = int(np.argmax(np.abs(states - state) / error))
         if not abs(states[worst] - state[worst]) <= factor * error[worst]:
@@ -431,11 +432,11 @@ def main():
         for seed in range(arguments.first_values, arguments.first_values + arguments.values):
             reference = cached_reference(structure, seed, solutions)
             slow = ("python", "fmi3") if seed % arguments.bits == 0 else ()
-            new, more, worker = run_case(worker, paths, structure, seed, reference, slow_backends=slow)
-            failures += new
-            counts += more
+            new_failures, new_counts, worker = run_case(worker, paths, structure, seed, reference, slow_backends=slow)
+            failures += new_failures
+            counts += new_counts
             counts["cases"] += 1
-            counts["cases with failures"] += bool(new)
+            counts["cases with failures"] += bool(new_failures)
         for failure in failures:
             print(failure, flush=True)
             kinds[failure.kind, METHODS.get(failure.method), failure.rtol] += 1

@@ -92,11 +92,11 @@ def run_in_terminal(arguments: list[str], timeout: float) -> Reply:
     ) as process:
         os.close(slave)
         while True:
-            rest = begin + timeout - monotonic()
-            if rest <= 0 and not is_killed:
+            remaining_time = begin + timeout - monotonic()
+            if remaining_time <= 0 and not is_killed:
                 os.killpg(process.pid, signal.SIGKILL)
                 is_killed = True
-            ready, _, _ = select.select([master], [], [], max(rest, 1.0))
+            ready, _, _ = select.select([master], [], [], max(remaining_time, 1.0))
             chunk = b""
             with suppress(OSError):  # the terminal is closed
                 chunk = os.read(master, 65536) if ready else b""
@@ -152,8 +152,8 @@ def try_fmu(fmu: Path, folder: Path, timeout: float) -> Iterator[Trial]:
     def compare(name: str, first: Path, *more: str) -> tuple[Reply, float]:
         """Compare the FMU with a result; return the reply and the largest relative difference, nan without one."""
         target = folder / name
-        rest = [*options, "--out", str(target), *more]
-        reply = run_in_terminal(["compare", str(first), str(fmu), *rest], timeout)
+        arguments = [*options, "--out", str(target), *more]
+        reply = run_in_terminal(["compare", str(first), str(fmu), *arguments], timeout)
         file = next(iter(target.glob("compare/*/compare.json")), target / "none")
         variables = read_json(file).get("variables", [])
         return reply, max((variable["relative"] for variable in variables), default=nan)

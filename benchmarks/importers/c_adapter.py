@@ -68,8 +68,8 @@ def reset_cycle_calls(request: ImporterRequest) -> list[str]:
 def parse_output(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
     """Parse the rows of values of `count` instances, and for each step whether all instances accepted it."""
     words = [line.split() for line in lines]
-    values = [[float(word) for word in rest] for kind, *rest in words if kind == "values"]
-    statuses = [rest == ["0"] for kind, *rest in words if kind == "status"]
+    values = [[float(word) for word in fields] for kind, *fields in words if kind == "values"]
+    statuses = [fields == ["0"] for kind, *fields in words if kind == "status"]
     rows = [[value for part in values[i : i + count] for value in part] for i in range(0, len(values), count)]
     return rows, [all(statuses[i : i + count]) for i in range(0, len(statuses), count)]
 

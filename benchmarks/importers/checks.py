@@ -253,8 +253,8 @@ def check_failure(importer: Importer, request: ImporterRequest) -> str:
 
 def expected_message(request: ImporterRequest) -> str:
     """Return the expected message: the rejected value, or divergence if several values are set."""
-    (name, value), *more = {**request.run.values, **request.midrun_changes}.items()
-    return DIVERGENCE_MESSAGE if more else f"{name} = {value!r}"
+    (name, value), *other_values = {**request.run.values, **request.midrun_changes}.items()
+    return DIVERGENCE_MESSAGE if other_values else f"{name} = {value!r}"
 
 
 def shorten(subject: FmuUnderTest, values: dict[str, float] | None = None, **changes: Any) -> ImporterRequest:

@@ -91,9 +91,11 @@ def certify_puck() -> Solution:
         v = hypot(y[2], y[3])
         return [y[2], y[3], -f / m * y[2] / v, -F / m - f / m * y[3] / v]
 
-    moving = times[np.hypot(states[:, 2], states[:, 3]) > SLOW]
-    second = solve_ivp(rates, (0.0, moving[-1]), [0.0, 0.0, v_x0, v_y0], "DOP853", moving, rtol=3e-14, atol=1e-16)
-    difference = float(relative_errors(second.y.T, states[: len(moving)]).max())
+    moving_times = times[np.hypot(states[:, 2], states[:, 3]) > SLOW]
+    second = solve_ivp(
+        rates, (0.0, moving_times[-1]), [0.0, 0.0, v_x0, v_y0], "DOP853", moving_times, rtol=3e-14, atol=1e-16
+    )
+    difference = float(relative_errors(second.y.T, states[: len(moving_times)]).max())
     return Solution(
         times, states, [(t_rest, 0)], start_mode=1, method="closed form and DOP853", estimated_error=difference
     )

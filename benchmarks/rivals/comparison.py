@@ -90,13 +90,13 @@ def cells(comparison: Comparison, result: Result) -> list[str]:
     """Return the cells of a result."""
     measures = result.measures
     assert measures
-    late = "-" if measures.event_error != measures.event_error else f"{measures.event_error:.0e}"
+    event_error = "-" if measures.event_error != measures.event_error else f"{measures.event_error:.0e}"
     ratio = comparison.time_ratio(result)
     return [
         f"{measures.error:.1e}",
         f"{measures.creep:.0e}",
         f"{measures.missed}/{measures.spurious}",
-        late,
+        event_error,
         f"{measures.steps}",
         "-" if ratio != ratio else f"{ratio:.2g}",
         f"{result.lines}",

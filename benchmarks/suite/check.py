@@ -37,9 +37,11 @@ def find_rows(time: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the last row of each point (n,) in s; ValueError if one is missing."""
     tolerance = 1e-6 * (points[1] - points[0])
     rows = np.searchsorted(time, points + tolerance, side="right") - 1
-    missing = (rows < 0) | (np.abs(time[rows] - points) > tolerance)
-    if missing.any():
-        raise ValueError(f"{missing.sum()} of {len(points)} times are missing, the first is {points[missing][0]!r} s")
+    is_missing = (rows < 0) | (np.abs(time[rows] - points) > tolerance)
+    if is_missing.any():
+        raise ValueError(
+            f"{is_missing.sum()} of {len(points)} times are missing, the first is {points[is_missing][0]!r} s"
+        )
     return np.asarray(rows)
 
 
@@ -64,8 +66,8 @@ def check_case(folder: Path, results: Path, name: str, case: dict[str, Any]) -> 
         return {"motion": "- no result"}
     reference, result = read_columns(folder / name / f"{name}_ref.csv"), read_columns(file)
     states, tolerance = case["states"], case["tolerance"]
-    if lacking := [column for column in ("time", *states) if column not in result]:
-        return {"motion": f"- {', '.join(lacking)} missing"}
+    if missing_columns := [column for column in ("time", *states) if column not in result]:
+        return {"motion": f"- {', '.join(missing_columns)} missing"}
     if result["time"].min() > reference["time"][0] + 1e-6 * (reference["time"][1] - reference["time"][0]):
         reference = {column: values[1:] for column, values in reference.items()}  # some tools record no start
     time = reference["time"]

@@ -19,9 +19,9 @@ PLATFORM = {"linux": "linux64", "darwin": "darwin64", "win32": "win64"}.get(sys.
 
 def all_models() -> list[Path]:
     """Return the files of all models: those of fmus, fmus/more and tests/example_models."""
-    models = [MORE.parent / f"{name}.py" for name in model_names()]
-    more = [MORE / f"{name}.py" for name in more_model_names()]
-    return [*models, *more, *sorted(EXAMPLES.rglob("*.py"))]
+    main_models = [MORE.parent / f"{name}.py" for name in model_names()]
+    more_models = [MORE / f"{name}.py" for name in more_model_names()]
+    return [*main_models, *more_models, *sorted(EXAMPLES.rglob("*.py"))]
 
 
 def model_label(source: Path) -> str:

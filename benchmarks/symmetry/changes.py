@@ -56,7 +56,7 @@ class Change:
         Whether the bits must be equal, apart from the factors.
     slack : float
         Tolerance relative to that of the method.
-    moving : mapping
+    moving_columns : mapping
         For columns in another frame of reference: the column in the changed run, and what is added to it to get the
         original one: a number and a rate in 1/s.
     """
@@ -71,7 +71,7 @@ class Change:
     mode_sign: int = 1
     is_exact: bool = False
     slack: float = 1.0
-    moving: Mapping[str, tuple[str, float, float]] = field(default_factory=dict)
+    moving_columns: Mapping[str, tuple[str, float, float]] = field(default_factory=dict)
 
     @property
     def stop(self) -> float:
@@ -88,9 +88,9 @@ class Change:
 
     def restore_column(self, name: str, changed_motion: "Motion") -> np.ndarray:
         """Return a column of the changed run in the frame of the original one."""
-        if name not in self.moving:
+        if name not in self.moving_columns:
             return changed_motion.columns[name]
-        other, offset, speed = self.moving[name]
+        other, offset, speed = self.moving_columns[name]
         column: np.ndarray = changed_motion.columns[other] + (
             offset + speed * (changed_motion.time - changed_motion.time[0])
         )
@@ -143,7 +143,7 @@ def add_revolutions(
                     0.0,
                     duration,
                     slack=REVOLUTIONS_SLACK,
-                    moving={angle: (angle, -turn, 0.0)},
+                    moving_columns={angle: (angle, -turn, 0.0)},
                 )
             )
     return changes
@@ -156,8 +156,8 @@ def move_to_frame(
     speeds = np.abs([base.columns[name] for name in frame.velocities])
     speed = float(f"{np.median(speeds[speeds > 0.0]):.3g}") if speeds.any() else 1.0
     starts = {setter: float(base.columns[name][0]) - speed for name, setter in frame.start_values.items()}
-    moving = {name: (other, speed, 0.0) for name, other in frame.velocities.items()}
-    moving |= {name: (other, 0.0, speed) for name, other in frame.positions.items()}
+    moving_columns = {name: (other, speed, 0.0) for name, other in frame.velocities.items()}
+    moving_columns |= {name: (other, 0.0, speed) for name, other in frame.positions.items()}
     return Change(
         FRAME,
         f"frame at {speed:g} {runs.variables[SPEED].unit}",
@@ -165,7 +165,7 @@ def move_to_frame(
         0.0,
         duration,
         slack=FRAME_SLACK,
-        moving=moving,
+        moving_columns=moving_columns,
     )
 
 

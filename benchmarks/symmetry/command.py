@@ -86,9 +86,9 @@ def symmetry(
     arguments = partial(build_fmu, builds), kinds or KINDS, methods, Options(max_steps=max_steps, long_run=long_run)
     with terminal.progress(len(tasks)) as report:
         outcomes = [outcome for group in run_tasks(tasks, arguments, workers, report) for outcome in group]
-    if missing := {*methods} - {outcome.method for outcome in outcomes}:
+    if missing_methods := {*methods} - {outcome.method for outcome in outcomes}:
         raise HarnessError(
-            f"no model has the method {min(missing)}: give a label of solver.method, as in --method dop853"
+            f"no model has the method {min(missing_methods)}: give a label of solver.method, as in --method dop853"
         )
     differences = [describe(outcome) for outcome in outcomes if outcome.difference]
     cells = list_cells(count_differences(outcomes, by_method))
@@ -126,8 +126,8 @@ def count_differences(outcomes: Sequence[Outcome], by_method: bool = False) -> C
     for outcome in outcomes:
         row = rows.setdefault(f"{outcome.model} {outcome.method}" if by_method else outcome.model, {})
         if not outcome.reason:
-            differing, runs = row.get(outcome.kind, (0, 0))
-            row[outcome.kind] = differing + bool(outcome.difference), runs + 1
+            n_differing, runs = row.get(outcome.kind, (0, 0))
+            row[outcome.kind] = n_differing + bool(outcome.difference), runs + 1
     return dict(sorted(rows.items()))
 
 
@@ -137,7 +137,7 @@ def list_cells(rows: Counts) -> list[list[str]]:
     sums: dict[str, tuple[int, int]] = {}
     for kind in kinds:
         counts = [row[kind] for row in rows.values() if kind in row]
-        sums[kind] = sum(differing for differing, _ in counts), sum(runs for _, runs in counts)
+        sums[kind] = sum(n_differing for n_differing, _ in counts), sum(runs for _, runs in counts)
     cells = [
         [name, *("{} of {}".format(*row[kind]) if kind in row else "-" for kind in kinds)]
         for name, row in (*rows.items(), ("all", sums))
@@ -186,7 +186,7 @@ def describe(outcome: Outcome) -> str:
 def as_data(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Return the outcomes for JSON."""
     counts = {
-        name: {kind: {"differing": differing, "runs": runs} for kind, (differing, runs) in row.items()}
+        name: {kind: {"differing": n_differing, "runs": runs} for kind, (n_differing, runs) in row.items()}
         for name, row in count_differences(outcomes).items()
     }
     return {"table": counts, "runs": [asdict(outcome) for outcome in outcomes]}

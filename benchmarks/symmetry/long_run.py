@@ -74,7 +74,7 @@ def find_irregular_period(times: np.ndarray, modes: np.ndarray, duration: float,
     A motion that comes to rest has no events after the early part.
     """
     tolerance = SLACK * rtol
-    late = np.flatnonzero(times >= EARLY * duration)
+    late_events = np.flatnonzero(times >= EARLY * duration)
     if not (times > 0.5 * EARLY * duration).any():
         return "", True
     period = find_period(times, modes, duration, tolerance)
@@ -82,7 +82,7 @@ def find_irregular_period(times: np.ndarray, modes: np.ndarray, duration: float,
         return "", False
     first = np.flatnonzero(times > 0.5 * EARLY * duration)[0]
     usual = float(times[first + period] - times[first])
-    for k in late:
+    for k in late_events:
         gap = times[k] - times[k - period]
         if (modes[k] != modes[k - period]).any():
             return f"event {k} at {times[k]:.9g} s: another mode than a period before", True

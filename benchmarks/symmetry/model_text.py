@@ -135,20 +135,20 @@ def order_last_first(statements: list[ast.stmt]) -> list[ast.stmt]:
     assigned_names = [find_names(statement, ast.Store) for statement in statements]
     needed_names = [find_names(statement, ast.Load) for statement in statements]
     ordered_statements = [statement for statement in statements[:1] if is_docstring(statement)]
-    remaining = list(range(len(ordered_statements), len(statements)))
-    while remaining:
+    remaining_indices = list(range(len(ordered_statements), len(statements)))
+    while remaining_indices:
         ready = [
             i
-            for i in remaining
+            for i in remaining_indices
             if not any(
                 j != i and (assigned_names[j] & needed_names[i] or (j < i and assigned_names[i] & needed_names[j]))
-                for j in remaining
+                for j in remaining_indices
             )
         ]
         if not ready:
             return []
         i = max(ready)
-        remaining.remove(i)
+        remaining_indices.remove(i)
         ordered_statements.append(statements[i])
     return ordered_statements
 

@@ -247,7 +247,7 @@ def find_state_difference(base: Motion, changed_motion: Motion, change: Change, 
     for name in states:
         expected = change.map_column(name, base)
         column = change.restore_column(name, changed_motion)
-        other = change.moving[name][0] if name in change.moving else name
+        other = change.moving_columns[name][0] if name in change.moving_columns else name
         # in a frame, from larger values
         computed_column = column if other == name else changed_motion.columns.get(other, column)
         size = max(np.abs(expected).max(), np.abs(computed_column).max())

@@ -190,12 +190,12 @@ def resolve_motion(
     return replace(spec, values={**spec.values, **(values or {})}, inputs=columns)
 
 
-def expand_axes(over: "Mapping[str, ArrayLike]", count: int, most: int) -> "dict[str, np.ndarray]":
-    """Return the values of each of at most `most` parameters; `count` values between two ends."""
+def expand_axes(over: "Mapping[str, ArrayLike]", count: int, max_parameters: int) -> "dict[str, np.ndarray]":
+    """Return the values of each of at most `max_parameters` parameters; `count` values between two ends."""
     import numpy as np
 
-    if not 1 <= len(over) <= most:
-        number = "one" if most == 1 else "one or two"
+    if not 1 <= len(over) <= max_parameters:
+        number = "one" if max_parameters == 1 else "one or two"
         raise SceneError(f"over has {len(over)} parameters: give {number}, as in {{'v_belt': (0.1, 3)}}")
     axes = {name: np.asarray(row, dtype=float) for name, row in over.items()}
     for name, row in axes.items():

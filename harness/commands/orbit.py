@@ -52,8 +52,8 @@ def orbit(
 def split_axis(text: str) -> tuple[str, list[float]]:
     """Return the name and the ends, or all values, of an argument of --over."""
     name, _, span = text.partition("=")
-    low, _, rest = span.partition(":")
-    high, _, count = rest.partition(":")
+    low, _, remainder = span.partition(":")
+    high, _, count = remainder.partition(":")
     try:
         ends = float(low), float(high)
         steps = int(count) - 1 if count else 1

@@ -71,12 +71,12 @@ def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of all commands with results; the command receives them as `terminal`."""
 
     @wraps(command)
-    def wrapper(out: Path, as_json: bool, **others: Any) -> Any:
+    def wrapper(out: Path, as_json: bool, **options: Any) -> Any:
         context = click.get_current_context()
         for argument in context.command.params:
-            if isinstance(argument, click.Argument) and others.get(argument.name or "") == "":
+            if isinstance(argument, click.Argument) and options.get(argument.name or "") == "":
                 raise click.UsageError(f"{argument.make_metavar(context).strip('[]')} is empty: give a name or a path")
-        return command(terminal=Terminal(as_json, out), **others)
+        return command(terminal=Terminal(as_json, out), **options)
 
     return default_out_option(json_option(wrapper))
 

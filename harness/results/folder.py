@@ -56,7 +56,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
         own_files = (*own_files, DATA_FILE, FILE, SUMMARY_FILE)
         check_replaceable(folder, own_files)
         check_same_source(folder, source)
-        missing = [parent for parent in folder.absolute().parents if not parent.exists()]
+        missing_parents = [parent for parent in folder.absolute().parents if not parent.exists()]
         folder.parent.mkdir(parents=True, exist_ok=True)
         clean_up(folder, own_files)
     except OSError as error:
@@ -81,7 +81,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
                 rmtree(new_folder, ignore_errors=True)
             resources.close()
             with suppress(OSError):  # not empty
-                for parent in missing:
+                for parent in missing_parents:
                     parent.rmdir()
 
 

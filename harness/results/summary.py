@@ -30,9 +30,9 @@ MAX_REMARKS = 5  # that are printed; the first ones have the largest effect on t
 
 def limit_remarks(remarks: Sequence[str]) -> list[str]:
     """Return the remarks to print, and a sentence on where the others are."""
-    others = by_interface("--json prints them", "`remarks` has them")
+    hint = by_interface("--json prints them", "`remarks` has them")
     count = len(remarks) - MAX_REMARKS
-    return [*remarks[:MAX_REMARKS], *([f"{count} more remark{'s' * (count > 1)}: {others}."] if count > 0 else [])]
+    return [*remarks[:MAX_REMARKS], *([f"{count} more remark{'s' * (count > 1)}: {hint}."] if count > 0 else [])]
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ def find_fmu(name: str) -> Path:
         raise SceneError("no models found: run from the project directory, or set fmu = 'path/to/file.fmu'")
     if name not in names:
         raise SceneError(unknown_source_message("model", name, names))
-    folders, unbuilt = (MORE, MORE[0]) if name in list_more_models() else (FOLDERS, FOLDERS[0])
-    return next((file for folder in folders for file in folder.glob(f"{name}.fmu")), unbuilt / f"{name}.fmu")
+    folders, default_folder = (MORE, MORE[0]) if name in list_more_models() else (FOLDERS, FOLDERS[0])
+    return next((file for folder in folders for file in folder.glob(f"{name}.fmu")), default_folder / f"{name}.fmu")
 
 
 def fmi3_path(fmu: Path) -> Path:

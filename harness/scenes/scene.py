@@ -243,8 +243,8 @@ def load_scene(scene: str | Path) -> Scene:
 def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
     """Build a scene from the table in its file."""
     allowed_keys = {*field_names(SceneKeys), *SCENE_KEYS}
-    if unknown := {*table} - allowed_keys:
-        raise SceneError(unknown_name_message("key", min(unknown), allowed_keys))
+    if unknown_keys := {*table} - allowed_keys:
+        raise SceneError(unknown_name_message("key", min(unknown_keys), allowed_keys))
     keys = parse_table({name: value for name, value in table.items() if name not in SCENE_KEYS}, SceneKeys)
     run = build_run(locate_fmu(path, keys), keys, table)
     plots = default_plots(run.outputs) if keys.plots is None else keys.plots

@@ -99,8 +99,8 @@ def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faul
     """Return a table whose keys are the fields of a dataclass."""
     n_faults = len(faults)
     names = field_names(schema)
-    if unknown := table.keys() - set(names):
-        faults.append((0, unknown_name_message(f"key in [{path}]" if path else "key", min(unknown), names)))
+    if unknown_keys := table.keys() - set(names):
+        faults.append((0, unknown_name_message(f"key in [{path}]" if path else "key", min(unknown_keys), names)))
     required_keys = {
         field.name for field in fields(schema) if field.default is MISSING and field.default_factory is MISSING
     }

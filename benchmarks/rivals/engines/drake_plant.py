@@ -24,14 +24,14 @@ def simulate(scene: Scene, setting: Setting) -> Solution:
         raise NotOfferedError("the discrete plant ignores the static coefficient")
     plant_options = {name: value for name, value in setting.items() if hasattr(multibody.MultibodyPlantConfig, name)}
     options = analysis.SimulatorConfig(**{name: value for name, value in setting.items() if name not in plant_options})
-    builder, down, still = framework.DiagramBuilder(), [0.0, 0.0, 1.0], math.RigidTransform()
+    builder, direction, still = framework.DiagramBuilder(), [0.0, 0.0, 1.0], math.RigidTransform()
     plant, _ = multibody.AddMultibodyPlant(multibody.MultibodyPlantConfig(**plant_options), builder)
     solid = tree.UnitInertia.SolidSphere(RADIUS)
     ball = plant.AddRigidBody("ball", tree.SpatialInertia(scene.inertia, np.zeros(3), solid))
     carrier = plant.AddRigidBody("carrier", tree.SpatialInertia.Zero())
     track = tree.PrismaticJoint("track", plant.world_frame(), carrier.body_frame(), [1.0, 0.0, 0.0])
     plant.AddForceElement(tree.PrismaticSpring(plant.AddJoint(track), 0.0, scene.stiffness))
-    plant.AddJoint(tree.PrismaticJoint("lift", carrier.body_frame(), ball.body_frame(), down))
+    plant.AddJoint(tree.PrismaticJoint("lift", carrier.body_frame(), ball.body_frame(), direction))
     weight = scene.inertia * plant.gravity_field().kDefaultStrength
     friction = multibody.CoulombFriction(scene.hold(0.0) / weight, scene.slide(0.0, 0.0) / weight)
     plant.RegisterCollisionGeometry(plant.world_body(), still, geometry.HalfSpace(), "ground", friction)

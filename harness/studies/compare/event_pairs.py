@@ -66,16 +66,16 @@ class EventPairs:
         parts = [f"{count}, at most {self.largest_shift:.3g} s apart" if len(self.one) else count]
         for name, rows in zip(names, self.unmatched, strict=True):
             descriptions = [f"{self.state(mode, contact)} at t = {t:.6g} s" for t, mode, contact in rows[:MAX_LISTED]]
-            more = [f"{len(rows) - MAX_LISTED} more"] * (len(rows) > MAX_LISTED)
-            parts += [f"only in {name}: {', '.join(descriptions + more)}"] if descriptions else []
+            remainder = [f"{len(rows) - MAX_LISTED} more"] * (len(rows) > MAX_LISTED)
+            parts += [f"only in {name}: {', '.join(descriptions + remainder)}"] if descriptions else []
         return "; ".join(parts)
 
     def describe_first_difference(self, names: tuple[str, str]) -> str:
         """Return the first matched event whose times differ; empty if there is none."""
-        different = np.flatnonzero(np.abs(self.one[:, 0] - self.two[:, 0]) > SAME_TIME * np.abs(self.one[:, 0]))
-        if not len(different):
+        indices = np.flatnonzero(np.abs(self.one[:, 0] - self.two[:, 0]) > SAME_TIME * np.abs(self.one[:, 0]))
+        if not len(indices):
             return ""
-        (t, mode, contact), (other, *_) = self.one[different[0]], self.two[different[0]]
+        (t, mode, contact), (other, *_) = self.one[indices[0]], self.two[indices[0]]
         return (
             f"the first that differs is {self.state(mode, contact)} at t = {t:.6g} s in {names[0]} and "
             f"{other:.6g} s in {names[1]}"

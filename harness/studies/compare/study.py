@@ -290,8 +290,8 @@ def describe_sticks(side: Signals, other: Signals) -> str:
         f"{f'{name} ' if len(side.sticking) > 1 else ''}from t = {begin:.6g} to {end:.6g} s"
         for name, begin, end in rests[:MAX_LISTED]
     ]
-    more = [f"{len(rests) - MAX_LISTED} more"] * (len(rests) > MAX_LISTED)
-    text = f"{side.name} sticks {', '.join(descriptions + more)}" if rests else f"{side.name} never sticks"
+    remainder = [f"{len(rests) - MAX_LISTED} more"] * (len(rests) > MAX_LISTED)
+    text = f"{side.name} sticks {', '.join(descriptions + remainder)}" if rests else f"{side.name} never sticks"
     return f"{text}; {other.name} has no modes"
 
 

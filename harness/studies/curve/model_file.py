@@ -112,9 +112,9 @@ class Friction:
         Names that the expressions need.
     declarations : list of str
         Parameters or tables.
-    sliding : list of str
+    sliding_friction : list of str
         Expressions over `speed`: one for both directions, or one for each.
-    holding : list of str
+    holding_limits : list of str
         Limits of sticking; empty if these are the sliding friction at rest.
     """
 
@@ -122,8 +122,8 @@ class Friction:
     text: str
     imports: str
     declarations: list[str]
-    sliding: list[str]
-    holding: list[str]
+    sliding_friction: list[str]
+    holding_limits: list[str]
 
 
 def write_law_model(result: CurveIdentification) -> str:
@@ -165,10 +165,12 @@ def write_model(result: CurveIdentification, friction: Friction) -> str:
     best, points = result.best, result.points
     names = LINEAR if points.force_unit == "N" else ROTATION
     force, kind = names.force, names.kind
-    is_symmetric = len(friction.sliding) == 1
-    sliding = ["sliding"] if is_symmetric else ["forward", "backward"]
-    curves = [f"{name} = {text}" for name, text in zip(sliding, friction.sliding, strict=True)]
-    limits = [f"slide={mean_of(sliding)}"] + ([f"hold={mean_of(friction.holding)}"] if friction.holding else [])
+    is_symmetric = len(friction.sliding_friction) == 1
+    curve_names = ["sliding"] if is_symmetric else ["forward", "backward"]
+    curves = [f"{name} = {text}" for name, text in zip(curve_names, friction.sliding_friction, strict=True)]
+    limits = [f"slide={mean_of(curve_names)}"] + (
+        [f"hold={mean_of(friction.holding_limits)}"] if friction.holding_limits else []
+    )
     contact = f"{force}_friction" if is_symmetric else f"{force}_mean"
     asymmetry = (
         ""

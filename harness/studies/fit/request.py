@@ -300,11 +300,14 @@ def span_remarks(task: FitTask, records: Sequence[Samples]) -> Iterator[str]:
     for record in records:
         duration = float(record.t[-1] - record.t[0])
         ratio = duration / stop if stop else 1.0
-        for factor, how, unit in ((1000.0, "a thousand times as long as", "ms"), (0.001, "a thousandth of", "s")):
+        for factor, comparison, unit in (
+            (1000.0, "a thousand times as long as", "ms"),
+            (0.001, "a thousandth of", "s"),
+        ):
             if 1 / SPAN_RATIO < ratio / factor < SPAN_RATIO:
                 yield (
-                    f"{record.name} lasts {duration:.4g} s, about {how} a run of the FMU ({stop:g} s): if its times "
-                    f"are in {unit}, state that in their heading, as in t [{unit}], or by "
+                    f"{record.name} lasts {duration:.4g} s, about {comparison} a run of the FMU ({stop:g} s): if its "
+                    f"times are in {unit}, state that in their heading, as in t [{unit}], or by "
                     f"{option_text('time', f't [{unit}]')}."
                 )
 

@@ -94,12 +94,12 @@ def make_tasks(request: FitRequest, own_notes: tuple[str, ...] = ()) -> tuple[Fi
                 f"{name} has none of the free parameters {', '.join(request.free)}: free some of its own as well, as "
                 f"in {option_text('free', [*request.free, *available[:1]])}"
             )
-        missing = [
+        missing_names = [
             parameter
             for parameter in (*request.free, *request.run.values)
             if parameter not in available and parameter not in fixable
         ]
-        notes = (f"{name} has no {', '.join(missing)}: its fit leaves them out.",) if missing else ()
+        notes = (f"{name} has no {', '.join(missing_names)}: its fit leaves them out.",) if missing_names else ()
         try:
             tasks.append(replace(make_task(law), notes=notes if tasks else own_notes + notes))
         except SceneError as error:
@@ -107,8 +107,8 @@ def make_tasks(request: FitRequest, own_notes: tuple[str, ...] = ()) -> tuple[Fi
     for name in request.sigma:
         units = {task.variables[name].unit or "1" for task in tasks}
         if len(units) > 1:
-            where = f"{option_text('sigma')} of {name} has no single unit"
-            raise SceneError(f"{where}: it is in {' and '.join(sorted(units))}; leave it out")
+            problem = f"{option_text('sigma')} of {name} has no single unit"
+            raise SceneError(f"{problem}: it is in {' and '.join(sorted(units))}; leave it out")
     return tuple(tasks)
 
 

@@ -38,14 +38,14 @@ def plot_map(axes: Axes, result: "MapResult") -> None:
 def join_points(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return points (n, 2) in the order of a walk from an end to the nearest one; a row of NaN where that is far."""
     scaled_points = points / np.where(cells > 0.0, cells, 1.0)
-    left, order = {*range(len(points))}, [int(np.argmax(np.hypot(*(scaled_points - scaled_points.mean(axis=0)).T)))]
-    left.remove(order[0])
+    indices, order = {*range(len(points))}, [int(np.argmax(np.hypot(*(scaled_points - scaled_points.mean(axis=0)).T)))]
+    indices.remove(order[0])
     walk = [points[order[0]]]
-    while left:
-        nearest = min(left, key=lambda i: float(np.hypot(*(scaled_points[i] - scaled_points[order[-1]]))))
+    while indices:
+        nearest = min(indices, key=lambda i: float(np.hypot(*(scaled_points[i] - scaled_points[order[-1]]))))
         if np.hypot(*(scaled_points[nearest] - scaled_points[order[-1]])) > STRAIGHT:
             walk.append(np.full(2, np.nan))
         walk.append(points[nearest])
         order.append(nearest)
-        left.remove(nearest)
+        indices.remove(nearest)
     return np.array(walk)

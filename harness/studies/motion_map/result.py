@@ -130,10 +130,10 @@ class MapResult(Result):
     def sentences(self) -> list[str]:
         """Return the sizes of the regions, and the number of runs."""
         counts = ", ".join(f"{label} {count}" for label, count in Counter(self.labels).items())
-        more = len(self.edges) - MAX_ROWS
+        n_hidden = len(self.edges) - MAX_ROWS
         return [
             f"Points of the grid: {counts}.",
-            *[f"{more} more edges."] * (more > 0),
+            *[f"{n_hidden} more edges."] * (n_hidden > 0),
             *["Between two points of the grid there are more edges than were located: use more values."]
             * bool(self.n_gaps),
             f"{self.n_runs} runs of the FMU.",

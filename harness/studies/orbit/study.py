@@ -97,8 +97,8 @@ class BranchTracer:
 
         Motions return to the section; one that does not pass it, to the maximum of the state.
         """
-        is_orbit, every = motion.kind in (STICK_SLIP, SLIDING_ORBIT), motion.period / PATH_POINTS
-        path = [*self.oscillator.follow(motion.y, motion.period if is_orbit else 0.0, every if is_orbit else inf)]
+        is_orbit, step = motion.kind in (STICK_SLIP, SLIDING_ORBIT), motion.period / PATH_POINTS
+        path = [*self.oscillator.follow(motion.y, motion.period if is_orbit else 0.0, step if is_orbit else inf)]
         passes = [False, *(self.oscillator.is_return(*pair) for pair in pairwise(path))]
         x = np.array([self.oscillator.measure(point.y) for point in path])
         passes = passes if any(passes) else x == x.max()
@@ -111,15 +111,15 @@ class BranchTracer:
         low, high = lower[0].value, upper[0].value
         steady = [next((motion for motion in motions if motion.kind == STEADY), None) for motions in (lower, upper)]
         sticks = [any(motion.kind == STICK_SLIP for motion in motions) for motions in (lower, upper)]
-        sliding = [[motion for motion in motions if motion.kind == SLIDING_ORBIT] for motions in (lower, upper)]
+        sliding_orbits = [[motion for motion in motions if motion.kind == SLIDING_ORBIT] for motions in (lower, upper)]
         points = []
         if steady[0] and steady[1]:
             if (steady[0].growth < 0.0) != (steady[1].growth < 0.0):
                 points.append(self.locate_stability(low, high))
             if sticks[0] != sticks[1] and self.oscillator.is_one_body:
                 points.append(self.locate_grazing(low, high, sticks[0]))
-            if not points and self.oscillator.is_one_body and abs(len(sliding[0]) - len(sliding[1])) == 2:
-                points.append(self.locate_fold(low, high, *sliding))
+            if not points and self.oscillator.is_one_body and abs(len(sliding_orbits[0]) - len(sliding_orbits[1])) == 2:
+                points.append(self.locate_fold(low, high, *sliding_orbits))
         return points
 
     def steady_sliding(self, value: float) -> SteadySliding:
@@ -303,7 +303,9 @@ def compute_orbits(
                 tracer.remarks.append(f"a special point below {name} is not located: {error}.")
             report(0.8 + 0.2 * number / len(values))
         points = join_changes(points)
-        every = tuple(motion for group in motions for motion in sorted(group, key=lambda motion: motion.amplitude))
+        all_motions = tuple(
+            motion for group in motions for motion in sorted(group, key=lambda motion: motion.amplitude)
+        )
         coordinate = oscillator.states[oscillator.coordinate]
         options = {"over": {parameter: [*values]} if parameter else None, "section": section, "period": period}
         return OrbitResult(
@@ -313,9 +315,9 @@ def compute_orbits(
             coordinate,
             oscillator.rates[oscillator.coordinate],
             oscillator.units[coordinate],
-            every,
+            all_motions,
             tuple(points),
-            () if parameter else tuple(tracer.trace_path(motion) for motion in every),
+            () if parameter else tuple(tracer.trace_path(motion) for motion in all_motions),
             tuple(dict.fromkeys(tracer.remarks)),
             oscillator.n_runs,
             {name: oscillator.default(name) for name in oscillator.parameters},

@@ -75,8 +75,8 @@ def choose_labelled(study: "PrecisionResult", case: "PrecisionCase") -> list[Sol
     peers = [solver for solver in ranks if solver[0] != FMU]
     solvers = [solver for solver in study.solvers(case) if solver[0] not in (FMPY, CS, ME)]
     errors = {solver: min((p.largest for p in study.curve(case, *solver)), default=np.inf) for solver in solvers}
-    rest = sorted(solvers, key=lambda solver: errors[solver])
-    return list(dict.fromkeys([*own_solvers[:2], *peers[:1], *ranks, *rest]))[: len(STYLES)]
+    sorted_solvers = sorted(solvers, key=lambda solver: errors[solver])
+    return list(dict.fromkeys([*own_solvers[:2], *peers[:1], *ranks, *sorted_solvers]))[: len(STYLES)]
 
 
 def plot_curves(axes: Axes, study: "PrecisionResult", case: "PrecisionCase", cost: str) -> None:

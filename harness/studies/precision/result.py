@@ -307,8 +307,8 @@ def split_clauses(text: str) -> tuple[str, ...]:
 
 def fastest_point(curve: Iterable[Point], target: float, beside_dry: bool = False) -> Point | None:
     """Return the fastest point with an error up to the target, or None."""
-    sufficient = [point for point in curve if point.error(beside_dry) <= target]
-    return min(sufficient, key=lambda point: point.seconds, default=None)
+    points = [point for point in curve if point.error(beside_dry) <= target]
+    return min(points, key=lambda point: point.seconds, default=None)
 
 
 def recommend(study: PrecisionResult) -> str:

@@ -131,8 +131,8 @@ def describe_failures(model: str, points: Sequence[Point]) -> tuple[str, ...]:
     n_failed = sum(bool(point.failure) for point in runs)
     counts = [f"{model}: {n_failed} of {len(runs)} runs failed; see {model}/points.csv"] * bool(n_failed)
     reasons = [*dict.fromkeys(point.failure for point in points if point.failure and isnan(point.rtol))]
-    if missing := missing_packages():
-        names = ", ".join(f"{package} ({peer})" for peer, package in missing.items())
+    if packages := missing_packages():
+        names = ", ".join(f"{package} ({peer})" for peer, package in packages.items())
         reasons.append(f"not installed: {names}, {install_command('peers')}")
     return (*counts, *([f"Not run: {'; '.join(reasons)}"] if reasons else ()))
 
@@ -279,9 +279,9 @@ def best_time(call: Callable[[], object], budget: float) -> float:
     return min(times)
 
 
-def repeats(once: float, budget: float) -> int:
-    """Return how often a call of `once` s is repeated within a budget in s."""
-    return 1 if once > 4 * budget else max(2, min(MAX_REPEATS, int(budget / once)))
+def repeats(call_time: float, budget: float) -> int:
+    """Return how often a call of `call_time` s is repeated within a budget in s."""
+    return 1 if call_time > 4 * budget else max(2, min(MAX_REPEATS, int(budget / call_time)))
 
 
 def find_changes(signals: Signals, name: str) -> list[tuple[float, int]]:
@@ -322,10 +322,10 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
         deviation.largest,
         integration=compute_errors(own_run, law_reference).largest,
     )
-    sticking = stuck_points(dry_reference)
-    if not sticking.any():
+    is_sticking = stuck_points(dry_reference)
+    if not is_sticking.any():
         return make_result(None, None, None)
-    creep = float(np.median(np.abs(law_reference.states[sticking, 1])))
+    creep = float(np.median(np.abs(law_reference.states[is_sticking, 1])))
     if case.problem.has_dry_friction:
         return make_result(creep, float(np.mean(np.diff([t for t, mode in law_reference.modes if mode]))), None)
     times = np.linspace(0.0, case.problem.stop, FINE)

@@ -420,9 +420,9 @@ def conclude(runs: Iterable[RunResult]) -> tuple[str, bool]:
     outcomes = [(run.title, outcome) for run in runs if (outcome := run.outcome)]
     counts = {kind: sum(outcome.kind == kind for _, outcome in outcomes) for kind in KINDS}
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
-    differing = [f"{name}: {outcome.text}" for name, outcome in outcomes if not outcome.is_good]
-    text = f"{len(outcomes) - len(differing)} of {len(outcomes)} cases agree within {MAX_DEVIATION:g} % ({kinds})."
-    return "\n".join((text, *differing)) if outcomes else "", not differing
+    differences = [f"{name}: {outcome.text}" for name, outcome in outcomes if not outcome.is_good]
+    text = f"{len(outcomes) - len(differences)} of {len(outcomes)} cases agree within {MAX_DEVIATION:g} % ({kinds})."
+    return "\n".join((text, *differences)) if outcomes else "", not differences
 
 
 def span_of(column: np.ndarray) -> list[Any]:

@@ -168,11 +168,11 @@ class StabilityResult(Result):
 
     def _tabulate(self) -> tuple[ResultTable, ...]:
         """Return the errors and steps of runs that should finish, and the messages of those that should be refused."""
-        finishing: dict[tuple[str, str], dict[str, CaseOutcome]] = {}
+        finishing_cases: dict[tuple[str, str], dict[str, CaseOutcome]] = {}
         numbers, refusals = dict[str, float](), dict[str, list[CaseOutcome]]()
         for row in sorted(self.outcomes, key=lambda row: row.case.name):
             if row.case.max_error is not None:
-                finishing.setdefault((row.case.name, row.case.title), {})[row.case.method] = row
+                finishing_cases.setdefault((row.case.name, row.case.title), {})[row.case.method] = row
                 numbers[row.case.method] = row.case.run.values["solver.method"]
         for row in self.outcomes:
             if row.case.max_error is None:
@@ -183,7 +183,7 @@ class StabilityResult(Result):
             for name in sorted(numbers, key=lambda name: numbers[name])
         ]
         title = "largest relative error, and internal steps below"
-        errors = ResultTable([*finishing.items()], columns, title, group=lambda item: (item[0][0],))
+        errors = ResultTable([*finishing_cases.items()], columns, title, group=lambda item: (item[0][0],))
         return errors, ResultTable([*refusals.values()], REFUSALS, "refused with a message")
 
     def _tabulate_details(self) -> tuple[ResultTable, ...]:
@@ -208,13 +208,13 @@ class StabilityResult(Result):
     def sentences(self) -> list[str]:
         """Return a summary of outcomes, energy, and steps bounded by stability."""
         lines = [f"{self._headline}."]
-        rising = [row for row in self.outcomes if row.energy_rise >= 0.0]
-        exact = [row.energy_rise for row in rising if row.case.method == "exact"]
-        others = [row.energy_rise / row.case.rtol for row in rising if row.case.method != "exact"]
+        rising_outcomes = [row for row in self.outcomes if row.energy_rise >= 0.0]
+        exact = [row.energy_rise for row in rising_outcomes if row.case.method == "exact"]
+        others = [row.energy_rise / row.case.rtol for row in rising_outcomes if row.case.method != "exact"]
         if exact and others:
             of_others = f"{max(others):.2g} rtol with other methods"
-            most = f"at most {max(exact):.1g} of its largest value with exact, {of_others}"
-            lines.append(f"Spurious increase of energy: {most}.")
+            text = f"at most {max(exact):.1g} of its largest value with exact, {of_others}"
+            lines.append(f"Spurious increase of energy: {text}.")
         for region in self.regions:
             bound = "bounded by stability" if region.slope < -0.5 else "not bounded by stability"
             growth = f"steps grow as x_m^{region.slope:+.2f} at x_m = {region.stiffness[-1]:g} m/s"

@@ -232,18 +232,18 @@ def completed_blocks(
     first, values, messages : int, numpy.ndarray, dict
         Number of the first run of a finished block, its values (runs, columns), and error messages by index.
     """
-    pending, repeated_runs, running = spans[::-1], set[int](), dict[Future[BlockResult], Span]()
+    pending_spans, repeated_runs, running_spans = spans[::-1], set[int](), dict[Future[BlockResult], Span]()
     size, deaths = 1, 0
-    while pending or running:
+    while pending_spans or running_spans:
         check_interrupt()
-        while pending and len(running) < 2 * workers.size:
-            share = sum(end - first for first, end in pending) // (SHARES * workers.size)
-            first, last = pending.pop()
+        while pending_spans and len(running_spans) < 2 * workers.size:
+            share = sum(end - first for first, end in pending_spans) // (SHARES * workers.size)
+            first, last = pending_spans.pop()
             end = min(last, first + max(1, min(size, share)))
-            pending += [(end, last)] if end < last else []
-            running[workers.submit(run_block, sweep.points.coordinates(first, end), runs)] = first, end
-        for future in workers.wait_for_any(running):
-            first, end = running.pop(future)
+            pending_spans += [(end, last)] if end < last else []
+            running_spans[workers.submit(run_block, sweep.points.coordinates(first, end), runs)] = first, end
+        for future in workers.wait_for_any(running_spans):
+            first, end = running_spans.pop(future)
             try:
                 result = future.result()
             except workers.death_errors:
@@ -252,12 +252,12 @@ def completed_blocks(
                     raise HarnessError(f"workers died {deaths} times") from None
                 if end > first + 1:
                     middle = (first + end) // 2
-                    pending += [(first, middle), (middle, end)]
+                    pending_spans += [(first, middle), (middle, end)]
                 elif first in repeated_runs:
                     yield first, np.full((1, sweep.columns), np.nan), {0: WORKER_DIED}
                 else:
                     repeated_runs.add(first)
-                    pending.append((first, end))
+                    pending_spans.append((first, end))
             except HarnessError:
                 raise
             except Exception as error:  # such as a missing package or lack of memory
