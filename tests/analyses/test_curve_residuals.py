@@ -11,7 +11,7 @@ from benchmarks.campaigns.hidden_defects import curve_record, preslide
 T = np.arange(0, 40.0, 0.005)
 V = 0.2 * np.sin(2 * np.pi * 2 * T / 40)
 STAIRS = np.concatenate([np.repeat([v, 0.0], [360, 90]) for v in np.outer(np.geomspace(0.02, 0.5, 8), [1, -1]).ravel()])
-PAUSED = np.arange(len(STAIRS)) * 0.005
+STAIR_TIMES = np.arange(len(STAIRS)) * 0.005
 
 
 def stribeck(v, F_c=6.0, F_s=9.0, F_v=20.0, v_s=0.02):
@@ -94,9 +94,9 @@ def code_without_zero(v):
     ids=["code", "tachometer", "gyro", "position"],
 )
 def test_standstill_that_does_not_read_zero_is_no_sliding(heading, measure, note):
-    held = np.repeat(np.random.default_rng(5).uniform(-2, 2, len(STAIRS) // 45), 45)  # by the drive, at rest
-    force = np.where(STAIRS == 0, held, 2.0 * np.sign(STAIRS) + 0.8 * STAIRS)
-    curve = identify(PAUSED, measure(STAIRS), force, heading)
+    holding_force = np.repeat(np.random.default_rng(5).uniform(-2, 2, len(STAIRS) // 45), 45)  # by the drive, at rest
+    force = np.where(STAIRS == 0, holding_force, 2.0 * np.sign(STAIRS) + 0.8 * STAIRS)
+    curve = identify(STAIR_TIMES, measure(STAIRS), force, heading)
     assert any(note in text for text in curve.points.notes)
     assert curve["F_c"].value == pytest.approx(2.0, abs=0.05)
     assert curve["F_v"].value == pytest.approx(0.8, abs=0.07)
@@ -117,8 +117,8 @@ def test_pauses_do_not_replace_the_samples_that_move():
     v = np.concatenate(
         [np.concatenate([np.zeros(200), 0.5 * np.sin(np.pi * np.arange(120) / 120) * s]) for s in [1, -1] * 6]
     )
-    held = np.repeat(np.random.default_rng(5).uniform(-2, 2, len(v) // 20), 20)
-    force = np.where(v == 0, held, 2.0 * np.sign(v) + 0.8 * v)
+    holding_force = np.repeat(np.random.default_rng(5).uniform(-2, 2, len(v) // 20), 20)
+    force = np.where(v == 0, holding_force, 2.0 * np.sign(v) + 0.8 * v)
     curve = identify(np.arange(len(v)) * 0.005, code_without_zero(v), force)
     assert "no plateaus" in curve.points.notes[-1]
     assert curve["F_c"].value == pytest.approx(2.0, abs=0.03)

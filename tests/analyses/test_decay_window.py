@@ -97,7 +97,7 @@ def other_motion(kind, seed, rate=200.0):
     else:
         mu = rng.uniform(3.0, 8.0)
         tau = t * omega
-        done = solve_ivp(
+        result = solve_ivp(
             lambda s, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]],
             (0.0, tau[-1]),
             [2.0, 0.0],
@@ -105,7 +105,7 @@ def other_motion(kind, seed, rate=200.0):
             rtol=1e-6,
             method="LSODA",
         )
-        x = a * done.y[0]
+        x = a * result.y[0]
     return Signal(t, x + 2e-4 * a * rng.standard_normal(len(t)))
 
 

@@ -16,7 +16,7 @@ def test_drift_is_reported_and_fitted_on_request():
     record = decay_record(0.01, 0.001, drift=0.002, noise=1e-4)
     assert "drift=True fits" in remarks_text(identify(record))
     fit = identify(record, drift=True)
-    by_name = {one.name: one for one in fit.estimates}
+    by_name = {estimate.name: estimate for estimate in fit.estimates}
     assert by_name["drift"].value == pytest.approx(0.002, rel=2e-2)
     assert by_name["zeta"].low < 0.01 < by_name["zeta"].high
     assert fit.remarks == ()
@@ -32,21 +32,24 @@ def test_a_large_drift_is_fitted_on_request(drift):
 
 def test_correlated_noise_is_reported_and_widens_the_intervals():
     record = decay_record(0.01, 0.001, noise=1e-3)
-    white = identify(record, drag=False)
+    white_fit = identify(record, drag=False)
     noise = np.convolve(np.random.default_rng(3).standard_normal(1019), np.ones(20), "valid") * 2e-4
-    repeated = identify(Signal(record.t, decay_record(0.01, 0.001).x + noise), drag=False)
-    assert "not independent" in remarks_text(repeated)
-    zeta = [next(estimate for estimate in result.estimates if estimate.name == "zeta") for result in (white, repeated)]
+    correlated_fit = identify(Signal(record.t, decay_record(0.01, 0.001).x + noise), drag=False)
+    assert "not independent" in remarks_text(correlated_fit)
+    zeta = [
+        next(estimate for estimate in result.estimates if estimate.name == "zeta")
+        for result in (white_fit, correlated_fit)
+    ]
     assert zeta[1].low < 0.01 < zeta[1].high
     assert zeta[1].error > zeta[0].error
 
 
-@pytest.mark.parametrize(("r", "repeated"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
-def test_a_loss_in_phase_with_the_sensor_resolution_is_reported(r, repeated):
+@pytest.mark.parametrize(("r", "has_remark"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
+def test_a_loss_in_phase_with_the_sensor_resolution_is_reported(r, has_remark):
     """Of 1 mm, where a half swing loses 2 r."""
     side = 1.0 if r > 1.9995e-3 else -1.0
     fit = identify(decay_record(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), drag=False)
-    assert ("rounds all turning points alike" in remarks_text(fit)) == repeated
+    assert ("rounds all turning points alike" in remarks_text(fit)) == has_remark
 
 
 def test_a_second_oscillation_is_reported():

@@ -16,10 +16,8 @@ QUANTITIES = ("position", "velocity", "acceleration")
 def test_stick_before_and_rest_after_the_motion_are_excluded():
     """The mass rests where static friction holds it, farther out than sliding friction alone would allow."""
     record = decay_record(0.01, 0.005)
-    held = np.concatenate(
-        [np.full(100, record.x[record.x.argmin()]), record.x[record.x.argmin() :], np.full(300, 0.03)]
-    )
-    fit = identify(Signal(0.004 * np.arange(len(held)), held))
+    x = np.concatenate([np.full(100, record.x[record.x.argmin()]), record.x[record.x.argmin() :], np.full(300, 0.03)])
+    fit = identify(Signal(0.004 * np.arange(len(x)), x))
     assert values(fit.estimates)["r"] == pytest.approx(0.005, rel=1e-3)
     assert "are excluded" in remarks_text(fit)
 
@@ -50,8 +48,8 @@ def held_in_mid_swing(swings, noise, zeta=0.015, end=2.0, hold=1e-5, rng=4):
     t = np.linspace(0, end * stop, 3000)
     rng = np.random.default_rng(rng)
     x = decay_record(zeta, turn=0.0, t=t).x + noise * rng.standard_normal(len(t))
-    held = t > stop
-    x[held] = x[held][0] + hold * rng.standard_normal(held.sum())
+    is_held = t > stop
+    x[is_held] = x[is_held][0] + hold * rng.standard_normal(is_held.sum())
     return Signal(t, x), stop
 
 
@@ -81,7 +79,7 @@ def test_repeated_samples_before_and_after_the_motion_are_excluded(drag):
     record = decay_record(0.01, 0.001, turn=0.0, noise=1e-4)
     x = np.concatenate([np.full(900, record.x[0]), record.x, np.full(1200, record.x[-1])])
     fit = identify(Signal(0.004 * np.arange(len(x)), x), drag=drag)
-    by_name = {one.name: one for one in fit.estimates}
+    by_name = {estimate.name: estimate for estimate in fit.estimates}
     assert abs(by_name["zeta"].value - 0.01) < 4 * by_name["zeta"].error < 0.002
     assert abs(by_name["r"].value - 0.001) < 4 * by_name["r"].error < 1e-4
 
@@ -131,19 +129,19 @@ def test_both_sides_of_a_gap_are_used(gap):
 @pytest.mark.parametrize(("hold", "phase"), [(0.12, 1.0), (0.3, 0.8)])
 def test_a_motion_that_starts_in_mid_swing_with_speed_costs_a_bounded_number_of_half_cycles(monkeypatch, hold, phase):
     """Held at its rest position before.  No law starts so, and a fit must not try laws with many more half cycles."""
-    evaluated, iterate = [], signal_model.iterate_return_map
+    half_cycles, iterate = [], signal_model.iterate_return_map
 
-    def counted(*args, **options):
+    def count_half_cycles(*args, **options):
         sequence = iterate(*args, **options)
-        evaluated.append(len(sequence.amplitudes))
+        half_cycles.append(len(sequence.amplitudes))
         return sequence
 
     for module in (signal_model, decay_problem):
-        monkeypatch.setattr(module, "iterate_return_map", counted)
+        monkeypatch.setattr(module, "iterate_return_map", count_half_cycles)
     t = np.linspace(0.0, 6.0, 240)
     swing = np.exp(-0.01 * 6 * (t - hold)) * np.cos(6 * (t - hold) + phase)
     x = np.where(t < hold, 0.0, swing) + 1e-3 * np.random.default_rng(3).standard_normal(len(t))
     fit = identify(Signal(t, x), drag=False)
     assert values(fit.estimates)["zeta"] == pytest.approx(0.01, rel=0.1)
-    assert max(evaluated) < 10 * 6 * 6 / np.pi
-    assert len(evaluated) < 400
+    assert max(half_cycles) < 10 * 6 * 6 / np.pi
+    assert len(half_cycles) < 400

@@ -46,9 +46,9 @@ def test_constants_and_standard_errors_equal_those_of_scipy():
     force = noisy_points(1)
     curve = harness.identify_curve((V, force))
     values, covariance = curve_fit(stribeck, V, force, [*TRUTH.values()])
-    found = [curve[name] for name in TRUTH]
-    np.testing.assert_allclose([item.value for item in found], values, rtol=1e-5)
-    np.testing.assert_allclose([item.error for item in found], np.sqrt(np.diag(covariance)), rtol=1e-3)
+    estimates = [curve[name] for name in TRUTH]
+    np.testing.assert_allclose([item.value for item in estimates], values, rtol=1e-5)
+    np.testing.assert_allclose([item.error for item in estimates], np.sqrt(np.diag(covariance)), rtol=1e-3)
     rss = float(((force - stribeck(V, *values)) ** 2).sum())
     assert curve.best.bic == pytest.approx(len(V) * np.log(rss / len(V)) + 5 * np.log(len(V)))
 
@@ -160,7 +160,7 @@ def test_one_direction_needs_a_known_bias():
         harness.identify_curve((V, noisy_points(1)), bias=30.0)
 
 
-REFUSED = [
+REFUSED_RECORDS = [
     ({"v [m/s]": V, "F [kg]": V}, {"force": "F"}, "F is in kg, and the velocity is in m/s: give a force"),
     ({"v [m/s]": V, "T [N.m]": V}, {}, "T is in N.m, and the velocity is in m/s"),
     ({"v [m]": V, "F [N]": V}, {"velocity": "v"}, "v is in m, which is not the unit of a velocity"),
@@ -181,7 +181,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("record", "options", "message"), REFUSED)
+@pytest.mark.parametrize(("record", "options", "message"), REFUSED_RECORDS)
 def test_points_without_a_curve_are_refused_in_a_sentence(record, options, message):
     with pytest.raises(HarnessError, match=message) as refusal:
         harness.identify_curve(record, **options)

@@ -20,9 +20,9 @@ def constant(p):
 
 def fit(residual):
     """Return the fitted constant and the number of evaluations."""
-    evaluated = []
-    p = least_squares(lambda p: (evaluated.append(p[REST]), residual(p))[1], START, np.array([REST]))[0]
-    return p[REST], len(evaluated)
+    evaluations = []
+    p = least_squares(lambda p: (evaluations.append(p[REST]), residual(p))[1], START, np.array([REST]))[0]
+    return p[REST], len(evaluations)
 
 
 def test_a_linear_problem_is_solved_to_rounding_in_few_steps():
@@ -32,14 +32,14 @@ def test_a_linear_problem_is_solved_to_rounding_in_few_steps():
     assert count <= 6
 
 
-@pytest.mark.parametrize("broken", ["residual", "jacobian"])
-def test_a_step_to_values_that_are_not_finite_is_refused(broken):
+@pytest.mark.parametrize("invalid_part", ["residual", "jacobian"])
+def test_a_step_to_values_that_are_not_finite_is_refused(invalid_part):
     """Beyond 2, where the least squares are."""
 
     def residual(p):
         r, jacobian = constant(p)
         if p[REST] > 2:
-            (r if broken == "residual" else jacobian)[-1] = np.nan
+            (r if invalid_part == "residual" else jacobian)[-1] = np.nan
         return r, jacobian
 
     value, _ = fit(residual)
@@ -89,14 +89,14 @@ def test_no_step_loses_the_cycles_of_the_record(unknown, best, low, high):
 @pytest.mark.parametrize(("unknown", "best", "limit"), [(OMEGA, 100.0, 10.0), (T0, -50.0, 6.3)])
 def test_a_step_that_loses_the_cycles_of_the_record_is_not_evaluated(unknown, best, limit):
     """Its evaluation could cost a million half cycles."""
-    evaluated = []
+    evaluated_values = []
 
     def residual(p):
-        evaluated.append(p[unknown])
+        evaluated_values.append(p[unknown])
         return p[unknown] - (LINE - 3.0 + best), np.ones((len(T), 1))
 
     least_squares(residual, START, np.array([unknown]))
-    assert limit / 2 < np.abs(evaluated).max() <= limit
+    assert limit / 2 < np.abs(evaluated_values).max() <= limit
 
 
 def test_fits_one_after_another_do_not_leave_the_frequency_of_the_record():

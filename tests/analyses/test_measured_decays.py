@@ -20,13 +20,13 @@ def fits(name):
     path = find_record(name)
     if path is None:
         pytest.skip(missing(name))
-    whole = identify_decay(path)
+    record_fit = identify_decay(path)
     parts = []
     for count in (2, 3):
-        edges = np.linspace(whole.t[0], whole.t[-1], count + 1)
+        edges = np.linspace(record_fit.t[0], record_fit.t[-1], count + 1)
         windows = pairwise(edges)
         parts.append([identify_decay(path, begin=begin, end=end) for begin, end in windows])
-    return whole, parts
+    return record_fit, parts
 
 
 @pytest.mark.campaign
@@ -34,17 +34,17 @@ def fits(name):
 def test_the_losses_of_halves_and_thirds_of_a_measured_record_agree(name):
     _, parts = fits(name)
     for windows in parts:
-        for one, other in combinations(windows, 2):
+        for fit, other in combinations(windows, 2):
             for loss in LOSSES:
-                assert one[loss].low <= other[loss].high, loss
-                assert other[loss].low <= one[loss].high, loss
+                assert fit[loss].low <= other[loss].high, loss
+                assert other[loss].low <= fit[loss].high, loss
 
 
 @pytest.mark.slow
 def test_a_measured_pendulum_on_ball_bearings_has_dry_friction():
     """Its swings fall by 4 r in each half cycle under friction alone, and by more with other losses."""
-    whole, _ = fits("pendulum_multiarm.csv")
-    swings = np.abs(np.diff(whole.extrema.x))[:9]
+    fit, _ = fits("pendulum_multiarm.csv")
+    swings = np.abs(np.diff(fit.extrema.x))[:9]
     largest = (swings[0] - swings[-1]) / (4 * (len(swings) - 1))
-    assert 0.3 * largest < whole["r"].low < whole["r"].value < largest
-    assert "r" in whole.best.terms
+    assert 0.3 * largest < fit["r"].low < fit["r"].value < largest
+    assert "r" in fit.best.terms

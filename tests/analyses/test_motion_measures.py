@@ -18,55 +18,55 @@ def simulate(model, **options):
 
 def test_dry_friction_lowers_each_peak_by_the_same_length():
     t, x, v, run = simulate("coulomb", stop=6.0, interval=0.003)
-    found = harness.measure(t, x, v)
+    measures = harness.measure(t, x, v)
     fall = 2 * run.parameters["f"] / run.parameters["k"]
-    assert found.decrements == pytest.approx(np.full(15, fall), rel=1e-4)
-    assert found["decrement"] == pytest.approx(fall, rel=1e-5)
-    assert found["period"] == pytest.approx(2 * pi * (run.parameters["m"] / run.parameters["k"]) ** 0.5, rel=1e-3)
-    assert (found["creep"], found["chatter"], found["slips"]) == (0, 0, 0)
-    assert found.rest_begin == pytest.approx(run.events.t[-1:], abs=0.01)
+    assert measures.decrements == pytest.approx(np.full(15, fall), rel=1e-4)
+    assert measures["decrement"] == pytest.approx(fall, rel=1e-5)
+    assert measures["period"] == pytest.approx(2 * pi * (run.parameters["m"] / run.parameters["k"]) ** 0.5, rel=1e-3)
+    assert (measures["creep"], measures["chatter"], measures["slips"]) == (0, 0, 0)
+    assert measures.rest_begin == pytest.approx(run.events.t[-1:], abs=0.01)
 
 
-@pytest.mark.parametrize("given", ["velocity", "position alone"])
-def test_viscous_damping_lowers_each_peak_by_the_same_ratio(given):
+@pytest.mark.parametrize("signals", ["velocity", "position alone"])
+def test_viscous_damping_lowers_each_peak_by_the_same_ratio(signals):
     zeta, t = 0.05, np.linspace(0.0, 5.0, 50001)
     decay = -zeta + 1j * (1 - zeta**2) ** 0.5
     z = np.exp(2 * pi * decay * t) / decay.imag
     x, v = (z * np.conj(decay)).imag * -1, 2 * pi * z.imag * -1
-    found = harness.measure(t, x, v if given == "velocity" else None, unit="rad")
+    measures = harness.measure(t, x, v if signals == "velocity" else None, unit="rad")
     delta = 2 * pi * zeta / (1 - zeta**2) ** 0.5
-    assert 2 * found.log_decrements == pytest.approx(np.full(len(found.turning_t) - 1, delta), rel=1e-3)
-    assert found["log_decrement"] == pytest.approx(delta, rel=1e-3)
-    assert "rad" in str(found)
-    assert "rest" not in found.to_pandas().index
+    assert 2 * measures.log_decrements == pytest.approx(np.full(len(measures.turning_t) - 1, delta), rel=1e-3)
+    assert measures["log_decrement"] == pytest.approx(delta, rel=1e-3)
+    assert "rad" in str(measures)
+    assert "rest" not in measures.to_pandas().index
 
 
 @pytest.mark.parametrize("longer", [1.0, 10.0])
 def test_slips_are_those_of_the_events(longer):
     """However long the body rests before, between and after them."""
     t, x, v, run = simulate("stickslip", values={"v_driver": 0.034 / longer}, stop=16.0 * longer, interval=0.002)
-    found = harness.measure(t, x, v)
+    measures = harness.measure(t, x, v)
     starts, ends = run.events.t[1::2], run.events.t[2::2]
-    assert found["slips"] == len(starts) == 4
-    assert found.rest_end[:-1] == pytest.approx(starts, abs=0.005)
-    assert found.rest_begin[1:] == pytest.approx(ends, abs=0.005)
-    assert found["slip_time"] == pytest.approx(np.mean(ends - starts), abs=0.01)
-    assert (found["creep"], found["chatter"]) == (0, 0)
+    assert measures["slips"] == len(starts) == 4
+    assert measures.rest_end[:-1] == pytest.approx(starts, abs=0.005)
+    assert measures.rest_begin[1:] == pytest.approx(ends, abs=0.005)
+    assert measures["slip_time"] == pytest.approx(np.mean(ends - starts), abs=0.01)
+    assert (measures["creep"], measures["chatter"]) == (0, 0)
 
 
 @pytest.mark.parametrize(("law", "creeps", "chatters"), [("hybrid", False, False), ("sign", True, True)])
 def test_chatter_at_rest_is_counted(law, creeps, chatters):
     t, x, v, _ = simulate("coulomb", values={"friction": law}, stop=6.0, method="ode23", rtol=1e-3)
-    found = harness.measure(t, x, v)
-    assert (found["creep"] > 0, found["chatter"] > 0) == (creeps, chatters)
+    measures = harness.measure(t, x, v)
+    assert (measures["creep"] > 0, measures["chatter"] > 0) == (creeps, chatters)
 
 
 def test_no_rest_is_found_in_an_oscillation_that_decays_to_nothing():
     t = np.linspace(0.0, 20.0, 4001)
-    found = harness.measure(t, np.exp(-0.1 * t) * np.cos(5 * t), -5 * np.exp(-0.1 * t) * np.sin(5 * t))
-    assert found["rests"] == 0
-    assert found["log_decrement"] == pytest.approx(0.1 * 2 * pi / 5, rel=0.02)
-    assert 0.9 < found["log_decrement"] / log(np.exp(0.04 * pi)) < 1.1
+    measures = harness.measure(t, np.exp(-0.1 * t) * np.cos(5 * t), -5 * np.exp(-0.1 * t) * np.sin(5 * t))
+    assert measures["rests"] == 0
+    assert measures["log_decrement"] == pytest.approx(0.1 * 2 * pi / 5, rel=0.02)
+    assert 0.9 < measures["log_decrement"] / log(np.exp(0.04 * pi)) < 1.1
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ pytestmark = pytest.mark.slow
 )
 def of_each_law(request):
     """A record of at least 200 samples for each law, of random amplitude, rate and noise: true parameters and fit."""
-    sine, quantised, order = request.param
-    records = [random_record(100 + i, law, sine, quantised, 200, order) for i, law in enumerate(LAWS)]
+    sine, is_quantised, order = request.param
+    records = [random_record(100 + i, law, sine, is_quantised, 200, order) for i, law in enumerate(LAWS)]
     return [(truth, identify(record, pendulum=sine)) for record, truth, _ in records]
 
 
@@ -25,7 +25,7 @@ def of_each_law(request):
 def test_no_estimate_is_far_off_without_a_remark(of_each_law):
     """benchmarks/campaigns/interval_coverage.py checks many more."""
     for truth, result in of_each_law:
-        by_name = {one.name: one for one in result.estimates}
+        by_name = {estimate.name: estimate for estimate in result.estimates}
         off = {name: abs(by_name[name].value - value) / by_name[name].error for name, value in truth.items()}
         assert max(off.values()) < FAR or result.remarks
 
@@ -33,11 +33,11 @@ def test_no_estimate_is_far_off_without_a_remark(of_each_law):
 def test_intervals_cover_the_true_value_at_their_level(of_each_law):
     """Fewer than 28 of 35 intervals at 95 % would cover the true value once in a thousand times
     (benchmarks/campaigns/interval_coverage.py counts a thousand records of every law)."""
-    held = []
+    coverage = []
     for truth, result in of_each_law:
-        by_name = {one.name: one for one in result.estimates}
-        held += [by_name[name].low <= value <= by_name[name].high for name, value in truth.items()]
-    assert np.sum(held) >= 28
+        by_name = {estimate.name: estimate for estimate in result.estimates}
+        coverage += [by_name[name].low <= value <= by_name[name].high for name, value in truth.items()]
+    assert np.sum(coverage) >= 28
 
 
 def test_an_extra_term_never_costs_more_than_ln_n(of_each_law):

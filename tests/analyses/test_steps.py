@@ -16,8 +16,8 @@ def test_step_collapse_compares_the_median_step_with_the_smallest_at_reversals(w
     scene = "title = 'a title'\nmodel = 'smd'\nmethod = 'ode23'\nstop = 4.0\noutputs = ['x', 'v']\nplots = []\n"
     values = f"analyses = ['steps']\n[values]\nx0 = 0.0\nv0 = {speed}\n"
     (workspace / "scene.toml").write_text(scene + values)
-    done = commands.harness(workspace, "run", "scene.toml", "--json")
-    quantities = {item["name"]: item["value"] for item in json.loads(done.stdout)["quantities"]}
+    result = commands.harness(workspace, "run", "scene.toml", "--json")
+    quantities = {item["name"]: item["value"] for item in json.loads(result.stdout)["quantities"]}
     run = harness.load_result(workspace / "results/scene")
     turns = [t for t, before, after in zip(run.time[1:], run["v"], run["v"][1:], strict=False) if before * after < 0]
     assert bool(turns) == ("collapse" in quantities) == bool(speed)

@@ -23,9 +23,9 @@ def test_a_thinned_record_is_that_of_the_same_motion_at_fewer_times(order, uneve
 def test_a_gap_costs_the_blocks_next_to_it_only():
     t = np.linspace(0.0, 6.0, 30_000)
     t = t[(t < 2.0003) | (t > 3.5)]  # within a block
-    thinned = identify(decay_record(0.01, turn=-0.01, t=t), drag=False).record
-    assert np.abs(thinned.x - decay_record(0.01, turn=-0.01, t=thinned.t).x).max() < 1e-6
-    assert len(thinned.t) > len(t) // (len(t) // 5000) - 10
+    record = identify(decay_record(0.01, turn=-0.01, t=t), drag=False).record
+    assert np.abs(record.x - decay_record(0.01, turn=-0.01, t=record.t).x).max() < 1e-6
+    assert len(record.t) > len(t) // (len(t) // 5000) - 10
 
 
 @pytest.mark.parametrize("step", [0.0, 1e-4])

@@ -104,9 +104,9 @@ def test_one_process_does_all_calls(worker):
 )
 def test_a_crash_is_one_sentence_and_another_process_goes_on(worker, function, argument, status):
     first = worker.call(os.getpid)
-    with pytest.raises(WorkerDiedError) as died:
+    with pytest.raises(WorkerDiedError) as error:
         worker.call(function, argument)
-    assert (died.value.status, str(died.value)) == (status, f"it ended with exit status {status}: no message")
+    assert (error.value.status, str(error.value)) == (status, f"it ended with exit status {status}: no message")
     assert worker.call(os.getpid) != first
 
 
@@ -137,10 +137,10 @@ def test_an_exception_does_not_end_the_process(worker, functions):
     with pytest.raises(HarnessError, match="this and that"):
         worker.call(functions.refuse_oddly)
     text = "ValueError: invalid literal for int() with base 10: 'x'"
-    with pytest.raises(WorkerCallError) as failed:
+    with pytest.raises(WorkerCallError) as error:
         worker.call(int, "x")
-    assert (str(failed.value), failed.value.last_line) == (f"a worker failed: {text}", text)
-    assert failed.value.messages.startswith("Traceback")
+    assert (str(error.value), error.value.last_line) == (f"a worker failed: {text}", text)
+    assert error.value.messages.startswith("Traceback")
     assert worker.call(os.getpid) == first
 
 
@@ -246,7 +246,7 @@ def test_a_script_that_does_not_guard_its_code_uses_workers(tmp_path):
     script.write_text(
         "import os\nfrom harness.process.worker import call_once\nprint(call_once(os.getpid) != os.getpid())\n"
     )
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, script], env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=60
     )
-    assert (done.stdout, done.stderr) == ("True\n", "")
+    assert (result.stdout, result.stderr) == ("True\n", "")

@@ -29,10 +29,10 @@ def more():
 def hold_and_release(fmu):
     """Return the position under a load that lasts, and after it is gone."""
     fmu.step(0.0, HOLD_TIME)
-    loaded = fmu.get("x")
+    loaded_position = fmu.get("x")
     fmu.set({"F_ext": 0.0})
     fmu.step(HOLD_TIME, REST)
-    return loaded, fmu.get("x")
+    return loaded_position, fmu.get("x")
 
 
 @pytest.mark.campaign
@@ -47,35 +47,35 @@ def test_a_hybrid_law_holds_a_load_below_the_limit_for_ever(worker, fmus, more, 
 
 def bristle_run(worker, more, name, **values):
     fmu = worker.instantiate(more / f"{name}.fmu").begin(FREE | {"solver.rtol": 1e-9} | values, stop=HOLD_TIME + REST)
-    loaded, released = hold_and_release(fmu)
+    loaded_position, released_position = hold_and_release(fmu)
     fmu.free()
-    return loaded, released
+    return loaded_position, released_position
 
 
 def test_elastoplastic_friction_deflects_elastically_and_returns(worker, more):
     """F/sigma_0 under the load, and nothing after it (P. Dupont et al., 2002)."""
-    loaded, released = bristle_run(worker, more, "elastoplastic")
-    assert loaded == pytest.approx(LOAD / 1e5, rel=1e-9)
-    assert abs(released) < 1e-13
+    loaded_position, released_position = bristle_run(worker, more, "elastoplastic")
+    assert loaded_position == pytest.approx(LOAD / 1e5, rel=1e-9)
+    assert abs(released_position) < 1e-13
 
 
 def test_lugre_friction_keeps_a_displacement_of_a_load_below_the_limit(worker, more):
     """The drift of G. Rill, T. Schaeffer, M. Schuderer, LuGre or not LuGre, Multibody System Dynamics (2023); the value
     is that of the second formulation."""
 
-    class Held(event_located.Bristles):
+    class HeldBristles(event_located.Bristles):
         load, stop = LOAD, REST_TIME
 
         def pull(self, t, x):
             return self.load
 
-    held = Held()
-    (*_, end), _ = event_located.solve(held, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
-    held.load, held.start = 0.0, tuple(end)
-    (*_, free), _ = event_located.solve(held, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
-    loaded, released = bristle_run(worker, more, "lugre")
-    assert (loaded, released) == pytest.approx((end[0], free[0]), rel=1e-6)
-    assert released > 0.1 * LOAD / 1e5
+    bristles = HeldBristles()
+    (*_, end), _ = event_located.solve(bristles, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
+    bristles.load, bristles.start = 0.0, tuple(end)
+    (*_, free), _ = event_located.solve(bristles, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
+    loaded_position, released_position = bristle_run(worker, more, "lugre")
+    assert (loaded_position, released_position) == pytest.approx((end[0], free[0]), rel=1e-6)
+    assert released_position > 0.1 * LOAD / 1e5
 
 
 def test_dahl_friction_is_lugre_without_damping(worker, more):

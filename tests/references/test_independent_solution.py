@@ -85,5 +85,5 @@ def test_the_pendulum_swings_and_rests_as_its_equations_state():
     weight = independent_pendulum.Pendulum()
     turns = [independent_pendulum.THETA0] + [swing.at(t)[0] for t, _ in swing.events]
     for a, b in itertools.pairwise(turns):
-        lost = weight.m * weight.g * weight.a * (mp.cos(b) - mp.cos(a))
-        assert lost == pytest.approx(weight.mu * weight.r * weight.m * weight.g * abs(a - b), abs=1e-13)
+        lost_energy = weight.m * weight.g * weight.a * (mp.cos(b) - mp.cos(a))
+        assert lost_energy == pytest.approx(weight.mu * weight.r * weight.m * weight.g * abs(a - b), abs=1e-13)

@@ -66,15 +66,15 @@ def held_below(eps, stop):
     def pull(t, x):
         return mpf(sled.k) * (mpf(sled.speed) * t - x)
 
-    def go(mode, piece, ended, step):
+    def go(mode, piece, has_ended, step):
         nonlocal t, x, v
         pieces.append((t, mode, x, piece))
         low, high, step = mpf(0), mpf(step), mpf(step)
-        while not ended(t + high, x + piece.at(high)[0], piece.at(high)[1]):
+        while not has_ended(t + high, x + piece.at(high)[0], piece.at(high)[1]):
             low, high = high, high + step
         while high - low > mpf(10) ** -35:
             middle = (low + high) / 2
-            over = ended(t + middle, x + piece.at(middle)[0], piece.at(middle)[1])
+            over = has_ended(t + middle, x + piece.at(middle)[0], piece.at(middle)[1])
             low, high = (low, middle) if over else (middle, high)
         y, v = piece.at(high)
         t, x = t + high, x + y

@@ -24,8 +24,8 @@ def write(folder, extra="", **keys):
 
 def run(scene):
     """Run a scene without drawing, and return the folder of its result and its provenance."""
-    done = commands.harness(scene.parent, "run", scene)
-    assert (done.returncode, done.stderr) == (0, "")
+    result = commands.harness(scene.parent, "run", scene)
+    assert (result.returncode, result.stderr) == (0, "")
     folder = scene.parent / "results" / scene.stem
     return folder, json.loads((folder / "provenance.json").read_text())
 
@@ -66,8 +66,8 @@ def test_a_grid_follows_the_solver_only_on_request(workspace):
 )
 def test_a_scene_without_plots_shows_its_outputs(workspace, outputs, plots):
     _, provenance = run(write(workspace, outputs=outputs, stop="0.1", grid="0.05"))
-    shown = provenance["scene"]["plots"]
-    assert shown == plots if isinstance(plots, list) else len(shown) == plots
+    shown_plots = provenance["scene"]["plots"]
+    assert shown_plots == plots if isinstance(plots, list) else len(shown_plots) == plots
 
 
 def test_a_scene_may_show_nothing(workspace):
@@ -122,17 +122,17 @@ def test_a_scene_may_show_nothing(workspace):
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_an_invalid_scene_is_reported_in_one_sentence(workspace, keys, sentence):
-    with pytest.raises(harness.SceneError) as caught:
+    with pytest.raises(harness.SceneError) as error:
         harness.simulate(write(workspace, **keys))
-    assert str(caught.value).startswith("scene mine: ")
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert str(error.value).startswith("scene mine: ")
+    assert sentence in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 def test_an_unknown_scene_error_lists_the_shipped_names(workspace):
-    done = commands.harness(workspace, "run", "pendulm")
-    assert done.returncode == 2
-    assert "unknown model or scene 'pendulm' (nearest: 'pendulum'); allowed: belt, " in done.stderr
+    result = commands.harness(workspace, "run", "pendulm")
+    assert result.returncode == 2
+    assert "unknown model or scene 'pendulm' (nearest: 'pendulum'); allowed: belt, " in result.stderr
 
 
 def test_a_missing_file_is_reported():

@@ -16,7 +16,7 @@ from benchmarks.symmetry.study import Model, Options, run_model
 
 LABELS = [model_label(path) for path in all_models()]
 KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP, REVOLUTIONS)
-SHIPPED = {
+FMU_BUILDERS = {
     PYTHON: build_cache.build_once,
     NATIVE: build_native_fmus,
     FMI3: build_fmi3_fmus,
@@ -26,7 +26,7 @@ SHIPPED = {
 def build(source, backend):
     """Return the FMU of a model file; that of other tests for the five models."""
     if source == find_source(source.stem if source.stem in LABELS else str(source)) and source.stem in MODELS:
-        return SHIPPED[backend]() / f"{source.stem}.fmu"
+        return FMU_BUILDERS[backend]() / f"{source.stem}.fmu"
 
     def make(folder):
         build_fmu(folder, source, backend)
@@ -39,11 +39,11 @@ def build(source, backend):
 def examine(label, backend=PYTHON, kinds=KINDS, methods=(), **options):
     """Return the runs, as (method, law), that were examined by symmetry, and the first differences."""
     outcomes = run_model(find_source(label), backend, build, kinds, methods, Options(**options))
-    examined = {}
+    examined_runs = {}
     for outcome in outcomes:
         if not outcome.reason:
-            examined.setdefault(outcome.kind, set()).add((outcome.method, outcome.law))
-    return examined, [describe(outcome) for outcome in outcomes if outcome.difference]
+            examined_runs.setdefault(outcome.kind, set()).add((outcome.method, outcome.law))
+    return examined_runs, [describe(outcome) for outcome in outcomes if outcome.difference]
 
 
 @cache

@@ -48,10 +48,10 @@ def run_command(folder, *arguments):
 
 def test_the_command_prints_counts_and_data(tmp_path):
     options = ("--backend", "python", "--method", "exact", "--change", TIME, "--change", MIRROR)
-    done = run_command(tmp_path, "smd", *options)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines()[0].startswith("What a change of time, unit, sign or order changes")
-    assert [cell.strip() for cell in done.stdout.splitlines()[4].split("│")[1:4]] == ["smd", "0 of 5", "0 of 1"]
+    result = run_command(tmp_path, "smd", *options)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.splitlines()[0].startswith("What a change of time, unit, sign or order changes")
+    assert [cell.strip() for cell in result.stdout.splitlines()[4].split("│")[1:4]] == ["smd", "0 of 5", "0 of 1"]
     data = json.loads(run_command(tmp_path, "smd", *options, "--json").stdout)
     assert data["table"] == {"smd": {TIME: {"differing": 0, "runs": 5}, MIRROR: {"differing": 0, "runs": 1}}}
     assert [run["text"] for run in data["runs"]][-1] == "signs inverted"
@@ -61,21 +61,21 @@ def test_the_command_prints_counts_and_data(tmp_path):
     ("name", "message"), [("nothing", "There is no model 'nothing'"), ("nothing.fmu", "there is no file nothing.fmu")]
 )
 def test_a_model_that_does_not_exist_is_refused(tmp_path, name, message):
-    done = run_command(tmp_path, name)
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"Error: {message}")
+    result = run_command(tmp_path, name)
+    assert result.returncode == 1
+    assert result.stderr.startswith(f"Error: {message}")
 
 
 def test_a_method_that_does_not_exist_is_refused(tmp_path, fmus):
-    done = run_command(tmp_path, fmus / "smd.fmu", "--method", "heun")
-    assert done.returncode == 1
-    assert done.stderr.startswith("Error: no model has the method heun")
+    result = run_command(tmp_path, fmus / "smd.fmu", "--method", "heun")
+    assert result.returncode == 1
+    assert result.stderr.startswith("Error: no model has the method heun")
 
 
 def test_an_fmu_without_its_model_file_is_examined(tmp_path, fmus):
-    done = run_command(tmp_path, fmus / "smd.fmu", "--method", "exact")
-    assert done.returncode == 0, done.stdout
-    assert "smd: order left out, smd.fmu is no model file (exact)" in done.stdout.splitlines()
+    result = run_command(tmp_path, fmus / "smd.fmu", "--method", "exact")
+    assert result.returncode == 0, result.stdout
+    assert "smd: order left out, smd.fmu is no model file (exact)" in result.stdout.splitlines()
 
 
 @pytest.mark.parametrize(
@@ -89,25 +89,25 @@ def test_an_fmu_without_its_model_file_is_examined(tmp_path, fmus):
     ),
 )
 def test_a_number_with_a_unit_is_no_silent_pass(tmp_path, number, reason):
-    done = run_command(tmp_path, write_cart(tmp_path, **number), "--backend", "python", "--change", UNITS)
-    assert done.returncode == 0
-    assert done.stdout.splitlines()[-1].startswith(f"cart: units left out, not scalable: {reason} (")
+    result = run_command(tmp_path, write_cart(tmp_path, **number), "--backend", "python", "--change", UNITS)
+    assert result.returncode == 0
+    assert result.stdout.splitlines()[-1].startswith(f"cart: units left out, not scalable: {reason} (")
 
 
 def test_a_model_that_does_not_build_is_refused(tmp_path):
-    done = run_command(tmp_path, write_cart(tmp_path, term="+ k"), "--backend", "python")
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"Error: {tmp_path / 'cart.py'}, line ")
-    assert "Traceback" not in done.stderr
+    result = run_command(tmp_path, write_cart(tmp_path, term="+ k"), "--backend", "python")
+    assert result.returncode == 1
+    assert result.stderr.startswith(f"Error: {tmp_path / 'cart.py'}, line ")
+    assert "Traceback" not in result.stderr
 
 
 def test_odd_variables_are_found():
-    found = {}
+    odd_variables = {}
     for label in ("stickslip", "belt", "rotor_brake"):
         fmu = build(find_source(label), PYTHON)
         names, _ = Equations(fmu).find_odd_variables(FmuRuns(fmu), {})
-        found[label] = sorted(names)
-    assert found == {
+        odd_variables[label] = sorted(names)
+    assert odd_variables == {
         "stickslip": ["F_ext", "v0", "v_driver", "x0"],
         "belt": ["F_ext", "v0", "v_belt", "x0"],
         "rotor_brake": ["T", "omega0", "omega_turn"],
@@ -126,7 +126,7 @@ EXACT = replace(SHIFT, is_exact=True)
 
 
 @pytest.mark.parametrize(
-    ("changed", "change", "difference"),
+    ("changed_fields", "change", "difference"),
     [
         ({}, SHIFT, ""),
         ({}, EXACT, ""),
@@ -153,8 +153,8 @@ EXACT = replace(SHIFT, is_exact=True)
         ),
     ],
 )
-def test_the_first_difference_is_found(changed, change, difference):
-    assert find_difference(BASE, replace(BASE, **changed), change, ["x", "v"], 1e-6) == difference
+def test_the_first_difference_is_found(changed_fields, change, difference):
+    assert find_difference(BASE, replace(BASE, **changed_fields), change, ["x", "v"], 1e-6) == difference
 
 
 @pytest.mark.parametrize(
@@ -175,10 +175,10 @@ def test_an_irregular_period_is_found(defect, difference):
         times[k] += 0.01
     elif kind == "end":
         times, modes = times[:k], modes[:k]
-    found, has_period = find_irregular_period(times, modes, 1000.0, 1e-6)
+    irregularity, has_period = find_irregular_period(times, modes, 1000.0, 1e-6)
     assert has_period
-    assert found.startswith(difference)
-    assert bool(found) == bool(difference)
+    assert irregularity.startswith(difference)
+    assert bool(irregularity) == bool(difference)
 
 
 @pytest.mark.parametrize("path", all_models(), ids=lambda path: f"{path.parent.name}/{path.stem}")

@@ -100,8 +100,8 @@ def test_no_revolution_of_a_machine_changes_its_motion(machine, backend):
     if backend == NATIVE:
         require_compiler()
     methods = () if backend == NATIVE else ("dop853",)
-    examined, differences = examine(machine, backend, methods)
-    assert examined == len(REVOLUTIONS_ADDED) * (4 if backend == NATIVE else 1)
+    n_runs, differences = examine(machine, backend, methods)
+    assert n_runs == len(REVOLUTIONS_ADDED) * (4 if backend == NATIVE else 1)
     assert not differences
 
 

@@ -39,15 +39,15 @@ HAVE_NONE = {  # no mirror image: a constant of one sign, a number as start valu
 
 @pytest.mark.parametrize("label", campaign_after(1, FEW_MODELS))
 def test_a_motion_depends_on_no_time_unit_sign_order_or_frame(label):
-    examined, differences = examine(label, methods=FEW_MODELS[label], **FEW)
-    assert {*examined} == {kind for kind in KINDS if kind != REVOLUTIONS or label in HAVE_ANGLES}
+    examined_runs, differences = examine(label, methods=FEW_MODELS[label], **FEW)
+    assert {*examined_runs} == {kind for kind in KINDS if kind != REVOLUTIONS or label in HAVE_ANGLES}
     assert not differences
 
 
 def check_all_changes(label, **options):
-    examined, differences = examine(label, **options)
+    examined_runs, differences = examine(label, **options)
     expected = {kind for kind in KINDS if label not in HAVE_NONE.get(kind, ())}
-    assert {*examined} == (expected if label in HAVE_ANGLES else expected - {REVOLUTIONS})
+    assert {*examined_runs} == (expected if label in HAVE_ANGLES else expected - {REVOLUTIONS})
     assert not differences
 
 
@@ -68,18 +68,18 @@ def test_no_motion_of_any_method_and_law_depends_on_them(label):
 @pytest.mark.parametrize("label", FEW_MODELS)
 def test_native_motions_depend_on_no_time_unit_or_sign(label, backend):
     kinds = (TIME, UNITS, MIRROR)
-    examined, differences = examine(label, backend, kinds, FEW_MODELS[label], **MORE)
-    assert {*examined} == {*kinds}
+    examined_runs, differences = examine(label, backend, kinds, FEW_MODELS[label], **MORE)
+    assert {*examined_runs} == {*kinds}
     assert not differences
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("label", PERIODIC)
 def test_every_period_of_a_long_run_has_the_same_events(label):
-    examined, differences = examine(
+    examined_runs, differences = examine(
         label, NATIVE if label == "stickslip" else "python", (LONG,), long_run=PERIODIC[label]
     )
-    assert {*examined} == {LONG}
+    assert {*examined_runs} == {LONG}
     assert not differences
 
 
