@@ -22,13 +22,13 @@ def test_a_first_step_that_fails_is_shortened_no_more_than_max_tries():
 def test_pivots_that_do_not_end_change_one_contact_at_a_time(monkeypatch):
     """A contact after the other, the first that violates its conditions, cannot cycle as joint pivots can."""
     (path,) = (path for path in LARGER_MODELS if path.stem == "stacked")
-    lowered, modes = lowered_model(path), []
+    stack_class, modes = lowered_model(path), []
 
     def violations(model, t, x1, v1, x2, v2, mode1, mode2, status1, status2, h_max, tie_tolerance):
         modes.append((mode1, mode2))
         return 1.0, 1.0, 1 - mode1, 1 - mode2
 
-    model, contact_lcp = lowered(), sibling_module(lowered, "runtime.contact_lcp")
+    model, contact_lcp = stack_class(), sibling_module(stack_class, "runtime.contact_lcp")
     monkeypatch.setattr(contact_lcp, "violations", violations)
     model.prepare()
     contact_lcp.solve_modes(model, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 1, 1, 0.1, 1e-9)

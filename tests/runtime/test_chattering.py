@@ -55,13 +55,13 @@ def build(tmp_path_factory):
     return build
 
 
-def follow(cls, values, duration, most):
+def follow(cls, values, duration, max_steps):
     """Return the status, the time and the number of steps at the end of a run."""
     model = cls()
     run = prepared_run(model, values)
     start(model, run, model.initial_state(0.0), duration)
     step, status = run.solver.step, 0
-    while step.t1 < duration and status == 0 and step.n_accepted < most:
+    while step.t1 < duration and status == 0 and step.n_accepted < max_steps:
         status = compute_step(model, run)
     return status, step.t1, step.n_accepted
 

@@ -8,11 +8,11 @@ from variants import campaign_after, slow_after
 
 from fmus.compiler.lowering import lowered_model
 
-HELD = '''
+HELD_BLOCK = '''
 from fmus import Contact, Input, Mode, Model, Output, Parameter, State, Table, cos, exp, tanh
 
 
-class Held(Model):
+class HeldBlock(Model):
     """Block on an incline whose holding limit dips in short periodic pulses."""
 
     m = Parameter(1.0, "kg", "mass", above=0.0)
@@ -68,14 +68,14 @@ DIPS = {
 
 
 @pytest.fixture(scope="module", params=slow_after(1, DIPS))
-def held(request, tmp_path_factory):
+def held_block(request, tmp_path_factory):
     return lower(tmp_path_factory.mktemp("models"), CONSTANT, DIPS[request.param])
 
 
 def lower(folder, clock, dip):
     """Return the class of a model whose holding limit has this dip over this clock."""
-    path = folder / "held.py"
-    path.write_text(HELD.format(clock=clock.strip(), dip=dip))
+    path = folder / "held_block.py"
+    path.write_text(HELD_BLOCK.format(clock=clock.strip(), dip=dip))
     return lowered_model(path)
 
 
@@ -95,10 +95,12 @@ def count_dips(cls, values):
     ("method", "rtol", "p"),
     slow_after(2, [(DOP853, 1e-9, 1000.0), (RODAS, 1e-4, 50.0), (ODE23, 1e-4, 1000.0), (ODE45, 1e-6, 200.0)]),
 )
-def test_no_dip_of_a_limit_is_missed(held, method, rtol, p):
+def test_no_dip_of_a_limit_is_missed(held_block, method, rtol, p):
     """The block starts in a dip, and there are 12 more in 40 s, each shorter than 10 % of the period."""
     for h_max in (0.0, 1e4):
-        assert count_dips(held, {"solver.method": method, "solver.rtol": rtol, "solver.h_max": h_max, "p": p}) == 13
+        assert (
+            count_dips(held_block, {"solver.method": method, "solver.rtol": rtol, "solver.h_max": h_max, "p": p}) == 13
+        )
 
 
 @pytest.mark.parametrize("clock", campaign_after(1, OTHER_CLOCKS))
@@ -120,9 +122,9 @@ def test_no_dip_of_a_table_is_missed(interpolation, tmp_path):
         assert count_dips(cls, {"solver.method": method, "solver.h_max": 1e4}) == len(dips)
 
 
-def test_rest_far_from_a_dip_costs_few_steps(held):
+def test_rest_far_from_a_dip_costs_few_steps(held_block):
     """Steps approach a dip geometrically."""
-    model = held()
+    model = held_block()
     run = prepared_run(model, {"solver.method": DOP853, "p": 1000.0, "D": 1.0})
     start(model, run, model.initial_state(0.0), 40.0)
     step = run.solver.step

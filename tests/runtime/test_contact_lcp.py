@@ -21,15 +21,15 @@ def vectors_are_arrays(monkeypatch):
 class Chain(CoupledFriction):
     """n contacts at rest: each body on the ground, or each on the previous one; slips accelerate with b - A F."""
 
-    def __init__(self, draw, n, jump, shared):
-        bodies = np.eye(n) - (np.eye(n, k=-1) if shared else 0.0)
+    def __init__(self, draw, n, jump, is_stacked):
+        bodies = np.eye(n) - (np.eye(n, k=-1) if is_stacked else 0.0)
         mass = draw.uniform(0.5, 3.0, n)
         self.A, self.b = bodies @ np.diag(1.0 / mass) @ bodies.T, bodies @ (draw.normal(0.0, 2.0, n) / mass)
         self.slide = draw.uniform(0.2, 2.0, n)
         self.limit, self.n = self.slide * jump, n
         self.b_rate = np.zeros(n)
 
-    def ordered(self, order):
+    def permute(self, order):
         """Return the same problem with another order of contacts."""
         other = object.__new__(Chain)
         other.A, other.n = self.A[np.ix_(order, order)], self.n
@@ -37,16 +37,16 @@ class Chain(CoupledFriction):
             setattr(other, name, getattr(self, name)[list(order)])
         return other
 
-    def solved(self, modes, b, slide):
+    def solve_forces(self, modes, b, slide):
         slides = np.array(modes) != STUCK
         return np.linalg.solve(np.where(slides[:, None], np.eye(self.n), self.A), np.where(slides, modes * slide, b))
 
     def contact_forces(self, t, y, modes):
         size = np.abs(self.b) + self.limit
-        return self.solved(modes, self.b, self.slide), self.limit, size, size
+        return self.solve_forces(modes, self.b, self.slide), self.limit, size, size
 
     def contact_rates(self, t, y, modes):
-        force, rate = self.solved(modes, self.b, self.slide), self.solved(modes, self.b_rate, 0.0)
+        force, rate = self.solve_forces(modes, self.b, self.slide), self.solve_forces(modes, self.b_rate, 0.0)
         pulls = [(b - self.A @ f) / np.diag(self.A) for b, f in ((self.b, force), (self.b_rate, rate))]
         return rate, np.zeros(self.n), *pulls
 
@@ -62,24 +62,29 @@ class Chain(CoupledFriction):
 
     def fits(self, modes):
         """Return whether no stuck contact exceeds its limit and no slipping contact is pulled back."""
-        force, pull = self.solved(modes, self.b, self.slide), self.b - self.A @ self.solved(modes, self.b, self.slide)
-        stuck = np.array(modes) == STUCK
-        return np.all(np.where(stuck, np.abs(force) <= self.limit * (1 + 1e-12), modes * pull >= -1e-12))
+        force, pull = (
+            self.solve_forces(modes, self.b, self.slide),
+            self.b - self.A @ self.solve_forces(modes, self.b, self.slide),
+        )
+        sticks = np.array(modes) == STUCK
+        return np.all(np.where(sticks, np.abs(force) <= self.limit * (1 + 1e-12), modes * pull >= -1e-12))
 
 
-@pytest.mark.parametrize(("n", "jump", "shared"), slow_after(9, product((2, 3, 1, 4), (1.0, 1.3, 2.0), (True, False))))
-def test_consistent_modes_are_found_for_any_order_of_contacts(n, jump, shared):
+@pytest.mark.parametrize(
+    ("n", "jump", "is_stacked"), slow_after(9, product((2, 3, 1, 4), (1.0, 1.3, 2.0), (True, False)))
+)
+def test_consistent_modes_are_found_for_any_order_of_contacts(n, jump, is_stacked):
     """If static and sliding friction are equal, the solution is unique; otherwise every contact that can stick does."""
-    draw = np.random.default_rng([n, round(10 * jump), shared])
+    draw = np.random.default_rng([n, round(10 * jump), is_stacked])
     for _ in range(24):
-        chain = Chain(draw, n, jump, shared)
+        chain = Chain(draw, n, jump, is_stacked)
         modes, fits = chain.answer()
         assert fits
         assert chain.fits(modes)
         if jump == 1.0:
-            assert [one for one in product((-1, 0, 1), repeat=n) if chain.fits(one)] == [modes]
+            assert [candidate for candidate in product((-1, 0, 1), repeat=n) if chain.fits(candidate)] == [modes]
         for order in list(permutations(range(n)))[:: 1 if n < 4 else 37]:
-            other, _ = chain.ordered(order).answer()
+            other, _ = chain.permute(order).answer()
             assert tuple(other[order.index(i)] for i in range(n)) == modes
 
 
@@ -131,15 +136,15 @@ def test_as_many_contacts_are_held_as_can_be(monkeypatch, n, jump):
     draw, n_choices = np.random.default_rng([n, round(10 * jump)]), 0
     for _ in range(60 if n < 4 else 30):
         chain = Chain(draw, n, jump, True)
-        held = [modes.count(STUCK) for modes in product((-1, 0, 1), repeat=n) if chain.fits(modes)]
+        stuck_counts = [modes.count(STUCK) for modes in product((-1, 0, 1), repeat=n) if chain.fits(modes)]
         modes, fits = chain.answer()
         assert fits
-        assert modes.count(STUCK) == max(held)
+        assert modes.count(STUCK) == max(stuck_counts)
         with monkeypatch.context() as patch:
             patch.setattr(contact_lcp, "MAX_ITERATIONS", 0)
             modes, fits = chain.answer()
-        assert (modes.count(STUCK), fits) == (max(held), True)
-        n_choices += min(held) < max(held)
+        assert (modes.count(STUCK), fits) == (max(stuck_counts), True)
+        n_choices += min(stuck_counts) < max(stuck_counts)
     assert n_choices > 3
 
 

@@ -31,8 +31,8 @@ def is_balanced(modes, pulls, holds, slides):
     forces = np.linalg.solve(
         np.where(slipping[:, None], np.eye(3), A), np.where(slipping, modes * slides * NORMAL_FORCES, b)
     )
-    held = np.abs(forces) <= holds * NORMAL_FORCES * (1.0 + 1e-12)
-    return bool(np.all(np.where(slipping, modes * (b - A @ forces) >= -1e-12, held)))
+    is_holding = np.abs(forces) <= holds * NORMAL_FORCES * (1.0 + 1e-12)
+    return bool(np.all(np.where(slipping, modes * (b - A @ forces) >= -1e-12, is_holding)))
 
 
 def balanced_modes(pulls, holds, slides):
@@ -100,9 +100,9 @@ def events(model, method, rtol, stop):
 
 def test_simultaneous_equal_events_are_one_event(custom_model):
     """Two equal sleds on two equal springs, pulled alike, have the same bits."""
-    (one, a), (two, b) = body("1", "k * (p - x1) - F1", 12.5), body("2", "k * (p - x2) - F2", 12.5)
+    (body1, a), (body2, b) = body("1", "k * (p - x1) - F1", 12.5), body("2", "k * (p - x2) - F2", 12.5)
     lines = contact("1", "v1", 20.0, 30.0) + contact("2", "v2", 20.0, 30.0)
-    changes, rows = events(custom_model(*one, *two, DRIVER, *lines, a, b, methods=["dop853"]), DOP853, 1e-10, 8.0)
+    changes, rows = events(custom_model(*body1, *body2, DRIVER, *lines, a, b, methods=["dop853"]), DOP853, 1e-10, 8.0)
     assert len(changes) > 5
     assert all(first == second for _, first, second in changes)
     assert all(x1 == x2 and v1 == v2 for _, (x1, v1, x2, v2), _ in rows)
@@ -111,22 +111,22 @@ def test_simultaneous_equal_events_are_one_event(custom_model):
 @pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
 def test_mirrored_blocks_stop_together(custom_model, method):
     """Apart from rounding errors, as those of a linear solver that takes the blocks in turn."""
-    (one, a), (two, b) = (
+    (body1, a), (body2, b) = (
         body("1", "-k * x1 + 0.4 * k * (x2 - x1) - F1", 1.0),
         body("2", "-k * x2 + 0.4 * k * (x1 - x2) - F2", 1.0),
     )
-    one[0], two[0] = (line[:-1] + f", start={x})" for line, x in ((one[0], 0.1), (two[0], -0.1)))
+    body1[0], body2[0] = (line[:-1] + f", start={x})" for line, x in ((body1[0], 0.1), (body2[0], -0.1)))
     lines = contact("1", "v1", 6.0, 7.5) + contact("2", "v2", 6.0, 7.5)
-    changes, _rows = events(custom_model(*one, *two, *lines, a, b, methods=NAMES), method, 1e-6, 3.0)
+    changes, _rows = events(custom_model(*body1, *body2, *lines, a, b, methods=NAMES), method, 1e-6, 3.0)
     assert [(first, second) for _, first, second in changes] == [(1, -1), (-1, 1), (1, -1), (0, 0)]
 
 
 def test_two_riders_on_one_carrier_break_away_and_stop_together(custom_model):
-    (carrier, a), (one, b) = body("0", "F1 + F2 - 3.0 * k * x0", 3.0), body("1", "k * (p - x1) - F1", 1.3)
-    two, c = body("2", "k * (p - x2) - F2", 1.3)
+    (carrier, a), (rider1, b) = body("0", "F1 + F2 - 3.0 * k * x0", 3.0), body("1", "k * (p - x1) - F1", 1.3)
+    rider2, c = body("2", "k * (p - x2) - F2", 1.3)
     lines = contact("1", "v1 - v0", 7.0, 10.0) + contact("2", "v2 - v0", 7.0, 10.0)
     changes, rows = events(
-        custom_model(*carrier, *one, *two, DRIVER, *lines, a, b, c, methods=["dop853"]), DOP853, 1e-10, 8.0
+        custom_model(*carrier, *rider1, *rider2, DRIVER, *lines, a, b, c, methods=["dop853"]), DOP853, 1e-10, 8.0
     )
     assert len(changes) > 5
     assert all(first == second for _, first, second in changes)
@@ -140,26 +140,29 @@ def test_a_block_and_the_plank_below_it_stop_under_constant_forces(custom_model,
     block[1] = block[1].replace('"speed of 2"', '"speed of 2", start=4.0')
     lines = contact("1", "v1", 2.0, 2.0) + contact("2", "v2 - v1", 5.0, 5.0)
     changes, rows = events(custom_model(*plank, *block, *lines, a, b, methods=NAMES), method, 1e-6, 10.0)
-    together = 4.0 / (5.0 + 1.0)  # s: accelerations 1 and -5 m/s2
-    stop = together + together / 0.5  # s: acceleration -0.5 m/s2
-    assert changes == [(pytest.approx(together), 1, 0), (pytest.approx(stop), 0, 0)]
+    sticking_time = 4.0 / (5.0 + 1.0)  # s: accelerations 1 and -5 m/s2
+    stop = sticking_time + sticking_time / 0.5  # s: acceleration -0.5 m/s2
+    assert changes == [(pytest.approx(sticking_time), 1, 0), (pytest.approx(stop), 0, 0)]
     for t, (_, v1, _, v2), _ in rows:
-        common = max(together - 0.5 * (t - together), 0.0)
-        assert (v1, v2) == pytest.approx((t, 4.0 - 5.0 * t) if t < together else (common, common), abs=1e-12)
+        common = max(sticking_time - 0.5 * (t - sticking_time), 0.0)
+        assert (v1, v2) == pytest.approx((t, 4.0 - 5.0 * t) if t < sticking_time else (common, common), abs=1e-12)
 
 
 def test_contacts_whose_effects_on_each_other_cancel_move_as_single_ones(custom_model):
     """Between two equal blocks, and on their mean speed: the difference and the mean of their positions are those of
     two blocks that each slide on their own."""
-    (one, a), (two, b) = body("1", "k * (p - x1) - F1 - 0.5 * F2", 1.0), body("2", "F1 - k * x2 - 0.5 * F2", 1.0)
-    (three, c), (four, d) = body("3", "k * (p - x3) - 2.0 * F3", 1.0), body("4", "0.5 * (k * (p - 2.0 * x4) - F4)", 1.0)
+    (body1, a), (body2, b) = body("1", "k * (p - x1) - F1 - 0.5 * F2", 1.0), body("2", "F1 - k * x2 - 0.5 * F2", 1.0)
+    (body3, c), (body4, d) = (
+        body("3", "k * (p - x3) - 2.0 * F3", 1.0),
+        body("4", "0.5 * (k * (p - 2.0 * x4) - F4)", 1.0),
+    )
     lines = [
         *contact("1", "v1 - v2", 5.0, 8.0),
         *contact("2", "0.5 * (v1 + v2)", 9.0, 11.0),
         *contact("3", "v3", 5.0, 8.0),
         *contact("4", "v4", 9.0, 11.0),
     ]
-    model = custom_model(*one, *two, *three, *four, DRIVER, *lines, a, b, c, d, methods=["dop853"])
+    model = custom_model(*body1, *body2, *body3, *body4, DRIVER, *lines, a, b, c, d, methods=["dop853"])
     _changes, rows = events(model, DOP853, 1e-10, 8.0)
     histories = [[mode for mode, _ in groupby(modes)] for modes in zip(*(modes for *_, modes in rows), strict=True)]
     assert histories[:2] == histories[2:]
@@ -184,14 +187,14 @@ def test_contacts_whose_effects_on_each_other_cancel_move_as_single_ones(custom_
 )
 def test_a_block_slides_where_the_speed_of_its_belt_jumps(custom_model, belt, second_speed, method):
     """The block follows the belt after 0.1 s, and is at 0.19 m after 1 s, where the speed jumps; closed form."""
-    (one, a), speed = body("1", "-F1", 1.0), 0.2
+    (block, a), speed = body("1", "-F1", 1.0), 0.2
     units = [
         'second = Parameter(1.0, "s", "time")',
         'metre = Parameter(1.0, "m", "length")',
         'clock = State("s", "time", rate=1.0)',
     ]
     lines = contact("1", f"v1 - {belt}", 2.0, 3.0)
-    changes, rows = events(custom_model(*units, *one, *lines, a, methods=NAMES), method, 1e-6, 2.0)
+    changes, rows = events(custom_model(*units, *block, *lines, a, methods=NAMES), method, 1e-6, 2.0)
     end = 1.0 + abs(second_speed - speed) / 2.0
     direction = 1 if second_speed < speed else -1
     assert [mode for _, mode in changes] == [0, direction, 0]
@@ -232,10 +235,10 @@ STEPS = [(DOP853, 1e-3), (DOP853, 1e-6), (DOP853, 1e-9), (ODE45, 1e-4), (ODE23, 
 def test_a_load_that_peaks_inside_a_step_is_detected(custom_model, method, rtol):
     """A free mass shakes a block held by friction with up to 10 N: 10 % to 0.01 % above the limit, or as far as the
     method resolves it."""
-    (free, a), (held, b) = body("1", "-k * (x1 - x2)", 1.0), body("2", "k * (x1 - x2) - F2", 5.0)
+    (mass, a), (block, b) = body("1", "-k * (x1 - x2)", 1.0), body("2", "k * (x1 - x2) - F2", 5.0)
     hold = 'most = Parameter(9.0, "N", "what is held", above=0.0)'
-    free[1] = free[1].replace('"speed of 1"', '"speed of 1", start=1.0')
-    model = custom_model(hold, *free, *held, *contact("2", "v2", "0.9 * most", "most"), a, b, methods=NAMES)
+    mass[1] = mass[1].replace('"speed of 1"', '"speed of 1", start=1.0')
+    model = custom_model(hold, *mass, *block, *contact("2", "v2", "0.9 * most", "most"), a, b, methods=NAMES)
     model.k = 100.0
     inside = 0
     for i in range(20):
@@ -297,19 +300,19 @@ def test_a_stuck_contact_keeps_zero_slip():
     for name in ("belt", "sleds", "stacked"):
         model = lowered_model(FILES[name])()
         _, rows = events(model, DOP853, 1e-9, model.stop_time)
-        held = 0
+        n_stuck = 0
         for t, y, modes in rows:
             slips = np.ravel(model.slip_velocities(t, *y))
             assert all(slip == 0.0 for slip, mode in zip(slips, modes, strict=True) if mode == 0)
-            held += 0 in modes
-        assert held > 5
+            n_stuck += 0 in modes
+        assert n_stuck > 5
 
 
 def test_several_drivers_each_pull_at_their_own_speed(custom_model):
     """A mass between two drivers; the second starts at another position, and its speed is an expression."""
     another = 'q = State("m", "another", start=0.3, rate=0.5 * u)'
-    (one, a) = body("1", "k * (p - x1) + k * (q - x1)", 1.0)
-    model = custom_model(*one, DRIVER, another, a, methods=["dop853"])
+    (mass, a) = body("1", "k * (p - x1) + k * (q - x1)", 1.0)
+    model = custom_model(*mass, DRIVER, another, a, methods=["dop853"])
     _, rows = events(model, DOP853, 1e-11, 2.0)
     w = 600.0**0.5
     for t, (x, v, q), _ in rows:
@@ -365,7 +368,7 @@ def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
         modes = tuple(components(run.solver.step, "modes1", model.contacts))
         assert run.solver.step.event_location.has_consistent_modes
         assert modes in solutions
-        assert modes.count(0) == max(one.count(0) for one in solutions)
+        assert modes.count(0) == max(solution.count(0) for solution in solutions)
         n_choices += len(solutions) > 1
     assert n_choices > 10
 
@@ -381,8 +384,8 @@ def test_a_contact_without_friction_is_no_contact(custom_model, free):
         for line in stack()
     ]
     results = []
-    for declared in lines, stack(without=free):
-        model = custom_model(*declared, methods=["dop853"])
+    for declarations in lines, stack(without=free):
+        model = custom_model(*declarations, methods=["dop853"])
         model.x1_start, model.x2_start, model.x3_start = 0.3, -0.2, 0.1
         changes, rows = events(model, DOP853, 1e-9, 6.0)
         results.append((changes, rows[-1][1]))
@@ -400,13 +403,13 @@ def test_a_contact_without_friction_is_no_contact(custom_model, free):
 def test_friction_may_vanish_and_return_in_a_run(custom_model, method):
     """A block upon a block, pressed by a force that comes and goes: without it, nothing sticks, and the lower block is
     a free oscillator."""
-    (one, a), (two, b) = body("1", "F2 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
+    (lower_block, a), (upper_block, b) = body("1", "F2 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
     law = 'N = Output("N", "force", choose(sin(phase) > 0.0, most * sin(phase), 0.0))'
     lines = [
         'most = Parameter(40.0, "N", "largest force")',
         'phase = State("rad", "phase", rate=3.0)',
-        *one,
-        *two,
+        *lower_block,
+        *upper_block,
         DRIVER,
         law,
         *contact("2", "v2 - v1", "N", "1.5 * N"),
@@ -443,8 +446,8 @@ def test_friction_may_vanish_and_return_in_a_run(custom_model, method):
 def test_a_slip_that_only_touches_zero_is_no_event(custom_model, method, rtol):
     """A block on a belt, with equal holding and sliding force, that starts at rest: its speed touches that of the belt
     once in each period."""
-    (one, a) = body("1", "-k * x1 - F1", 1.0)
-    model = custom_model(*one, *contact("1", "v1 - u", "2.0", "2.0"), a, methods=NAMES)
+    (block, a) = body("1", "-k * x1 - F1", 1.0)
+    model = custom_model(*block, *contact("1", "v1 - u", "2.0", "2.0"), a, methods=NAMES)
     model.k = 100.0
     changes, rows = events(model, method, rtol, 20.0)
     assert changes == []
@@ -475,8 +478,8 @@ def test_a_crank_passes_its_dead_points(method, start_angle):
     def speed(q):
         turns, angle = divmod(q + 0.5 * pi, pi)
         first, first_angle = divmod(start_angle + 0.5 * pi, pi)
-        lost = 2.0 * (turns - first) - cos(angle) + cos(first_angle)
-        return (36.0 - 2.0 * 2.0 * 0.3 * lost) ** 0.5
+        integral = 2.0 * (turns - first) - cos(angle) + cos(first_angle)
+        return (36.0 - 2.0 * 2.0 * 0.3 * integral) ** 0.5
 
     dead_points = [0.5 * pi + n * pi for n in range(1 if start_angle else 0, len(changes) + (1 if start_angle else 0))]
     assert len(changes) > 5
@@ -518,10 +521,14 @@ def test_laws_without_sticking_depend_on_each_slip(custom_model, law):
     """Rates, outputs and Jacobian are those of the modes given by the slips; the threshold law holds at most the
     limit."""
     words, expected_modes = LAWS[law]
-    (one, a), (two, b) = body("1", "F2 - F1 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
-    both = [line.replace("hold=", f"{words}, hold=") for line in contact("1", "v1", 9.0, 12.0)]
-    both += [line.replace("hold=", f"{words}, hold=") for line in contact("2", "v2 - v1", 6.0, 8.0)]
-    model, draw, clipped = custom_model(*one, *two, DRIVER, *both, a, b, methods=["ode23"]), np.random.default_rng(2), 0
+    (body1, a), (body2, b) = body("1", "F2 - F1 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
+    contact_lines = [line.replace("hold=", f"{words}, hold=") for line in contact("1", "v1", 9.0, 12.0)]
+    contact_lines += [line.replace("hold=", f"{words}, hold=") for line in contact("2", "v2 - v1", 6.0, 8.0)]
+    model, draw, n_clipped = (
+        custom_model(*body1, *body2, DRIVER, *contact_lines, a, b, methods=["ode23"]),
+        np.random.default_rng(2),
+        0,
+    )
     assert model.prepare() == 0
     for _ in range(200):
         y = draw.uniform(-0.05, 0.05, 4) * [1.0, draw.choice([0.0, 0.1, 1.0]), 1.0, draw.choice([0.1, 1.0])]
@@ -532,7 +539,7 @@ def test_laws_without_sticking_depend_on_each_slip(custom_model, law):
         if law == SIGN:
             forces = np.sign(slips) * [9.0, 6.0]
         limit = np.where(np.array(modes) == 0, [12.0, 8.0], np.inf)
-        clipped += bool(np.any(np.abs(forces) > limit))
+        n_clipped += bool(np.any(np.abs(forces) > limit))
         forces = np.clip(forces, -limit, limit)
         model.friction = law
         expected = (forces[1] - forces[0] - 300.0 * y[0]) / 4.0, (-300.0 * y[2] - forces[1]) / 2.0
@@ -541,7 +548,7 @@ def test_laws_without_sticking_depend_on_each_slip(custom_model, law):
         model.compute_outputs(0.0, *y, 1, -1)  # the modes at the last event do not matter
         assert (model.mode1, model.mode2) == (1, -1)
         assert pytest.approx(forces, abs=1e-11) == (model.F1, model.F2)
-    assert clipped == 0 or law == THRESHOLD
+    assert n_clipped == 0 or law == THRESHOLD
     run = prepared_run(model, {"solver.method": ODE23, "solver.rtol": 1e-3, "solver.atol": 1e-5, "u": 1.0})
     start(model, run, model.initial_state(0.0), 0.3)
     while run.solver.step.t1 < 0.3:
@@ -551,14 +558,17 @@ def test_laws_without_sticking_depend_on_each_slip(custom_model, law):
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(custom_model, bodies):
     """It agrees with differences of the rates, on the limit and below, so that rodas takes few steps."""
-    (one, a), (two, b) = body("1", "k * (p - x1) - F1" + " + F2" * (bodies - 1), 1.0), body("2", "-F2 - k * x2", 1.0)
-    both = contact("1", "v1", "f + w * x1", "1.5 * f + 2.0 * w * x1") + contact("2", "v2 - v1", "f", "2.0 * f")
-    declared = ['f = Parameter(6.0, "N", "friction")', 'w = Parameter(40.0, "N/m", "how it grows")', DRIVER, *one]
-    lines = [line.replace("hold=", f"{LAWS[THRESHOLD][0]}, hold=") for line in both]
-    lines = [*declared, *two, *lines, a, b] if bodies == 2 else [*declared, *lines[:2], a]
+    (body1, a), (body2, b) = (
+        body("1", "k * (p - x1) - F1" + " + F2" * (bodies - 1), 1.0),
+        body("2", "-F2 - k * x2", 1.0),
+    )
+    contact_lines = contact("1", "v1", "f + w * x1", "1.5 * f + 2.0 * w * x1") + contact("2", "v2 - v1", "f", "2.0 * f")
+    declarations = ['f = Parameter(6.0, "N", "friction")', 'w = Parameter(40.0, "N/m", "how it grows")', DRIVER, *body1]
+    lines = [line.replace("hold=", f"{LAWS[THRESHOLD][0]}, hold=") for line in contact_lines]
+    lines = [*declarations, *body2, *lines, a, b] if bodies == 2 else [*declarations, *lines[:2], a]
     model, draw, n_states = custom_model(*lines, methods=["rodas"]), np.random.default_rng(3), 2 * bodies
     assert model.prepare() == 0
-    model.friction, limited = THRESHOLD, 0
+    model.friction, n_limited = THRESHOLD, 0
     for _ in range(200):
         y = draw.uniform(-0.1, 0.1, n_states) * np.tile([1.0, 0.05], bodies)
         slopes = []
@@ -567,8 +577,8 @@ def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(custom_model,
             slopes.append((ahead - behind) / 2e-7)
         actual = np.reshape(model.jacobian(0.1, *y, *[0] * bodies), (bodies, n_states + 1))
         assert np.abs(actual[:, 1:].T - slopes).max() < 1e-5
-        limited += bool(abs(slopes[0][0]) < 300.0)
-    assert 20 < limited < 180
+        n_limited += bool(abs(slopes[0][0]) < 300.0)
+    assert 20 < n_limited < 180
 
 
 @pytest.mark.slow

@@ -28,5 +28,5 @@ def test_a_tight_tolerance_is_met_down_to_rounding_errors(launch):
         launch("pacejka", {"solver.method": method, "solver.rtol": 1e-13}, stop=8.0).run(times, outputs("pacejka")[:2])
         for method in (RADAU9, DOP853)
     )
-    for one, two in zip(zip(*truth, strict=True), zip(*run, strict=True), strict=True):
-        assert max(abs(a - b) for a, b in zip(one, two, strict=True)) < 1e-11 * max(map(abs, one))
+    for reference, column in zip(zip(*truth, strict=True), zip(*run, strict=True), strict=True):
+        assert max(abs(a - b) for a, b in zip(reference, column, strict=True)) < 1e-11 * max(map(abs, reference))

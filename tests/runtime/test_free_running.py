@@ -52,31 +52,31 @@ GRIDS = [*((case, False) for case in CASES), *((case, True) for case in FEW_CASE
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("case", "pushed"), GRIDS, ids=lambda part: str(part) if isinstance(part, bool) else label(part)
+    ("case", "has_pushes"), GRIDS, ids=lambda part: str(part) if isinstance(part, bool) else label(part)
 )
-def test_any_two_communication_grids_agree(launch, following, case, pushed):
+def test_any_two_communication_grids_agree(launch, following, case, has_pushes):
     name, values, stop = case
     names, draw = outputs(name) + counts(name), random.Random(label(case))
-    shared = [0.0, *sorted(draw.uniform(0.0, stop) for _ in range(25)), stop]
+    common_times = [0.0, *sorted(draw.uniform(0.0, stop) for _ in range(25)), stop]
     force, size = push(name)
-    changes = {shared[i]: {force: sign * size} for i, sign in ((6, 1), (11, -1), (17, 0))} if pushed else {}
+    changes = {common_times[i]: {force: sign * size} for i, sign in ((6, 1), (11, -1), (17, 0))} if has_pushes else {}
 
     def solve(*extra):
-        times = sorted({*shared, *extra})
+        times = sorted({*common_times, *extra})
         fmu = launch(name, values, stop=stop)
         rows = fmu.run_with_changes(times, names, changes)
         fmu.free()
-        return [row for t, row in zip(times, rows, strict=True) if t in set(shared)]
+        return [row for t, row in zip(times, rows, strict=True) if t in set(common_times)]
 
     expected = solve()
     internal, _ = following(case)
     straddling = [t + d for t in internal[1:-1:5] for d in (-1e-9, 1e-9)] + [
         nextafter(t, stop) for t in internal[1:-1:7]
     ]
-    between = [stop * i / 97 for i in range(97)] + [draw.uniform(0.0, stop) for _ in range(200)]
-    for extra in (internal, [*straddling, *between]):
+    times_between = [stop * i / 97 for i in range(97)] + [draw.uniform(0.0, stop) for _ in range(200)]
+    for extra in (internal, [*straddling, *times_between]):
         assert_close(solve(*extra), expected, names, 1e-12)
-    if not pushed:
+    if not has_pushes:
         assert_close(launch(name, values, stop=stop).run([0.0, stop], names)[-1:], expected[-1:], names, 1e-12)
 
 
@@ -154,8 +154,8 @@ def test_setting_a_value_to_itself_changes_nothing(launch, case):
     times = [stop * i / 60 for i in range(61)]
     expected = launch(name, values, stop=stop).run(times, names)
     fmu = launch(name, values, stop=stop)
-    same = dict(zip(tunable(name), fmu.get(*tunable(name)), strict=True))
-    assert_identical(fmu.run_with_changes(times, names, dict.fromkeys(times[1:-1], same)), expected, names)
+    current_values = dict(zip(tunable(name), fmu.get(*tunable(name)), strict=True))
+    assert_identical(fmu.run_with_changes(times, names, dict.fromkeys(times[1:-1], current_values)), expected, names)
 
 
 @each_case

@@ -123,7 +123,7 @@ def test_the_closed_form_is_right_to_rounding(draw_motion, seed):
         start, rate = draw_motion(draw)
         closed_form, segment = begin(start)
         s = min(power_of_ten(draw, -5, 1.5) / rate, closed_form.max_duration)
-        errors = [abs(got - true) for got, true in zip(closed_form.evaluate(s), segment.at(mpf(s)), strict=True)]
+        errors = [abs(value - true) for value, true in zip(closed_form.evaluate(s), segment.at(mpf(s)), strict=True)]
         errors[0] = abs(mpf(closed_form.evaluate(s)[0]) - start.x - segment.at(mpf(s))[0])
         for error, scale in zip(errors, largest_terms(start, mpf(s)), strict=True):
             assert error <= ROUNDING * scale, (start, s)
@@ -141,21 +141,25 @@ def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
         closed_form, segment = begin(start)
         horizon = min(closed_form.horizon, 100.0 / rate)
         mode = int(copysign(1.0, start.v or closed_form.a0 or segment.rate))
-        got = closed_form.next_standstill(mode)
+        standstill = closed_form.next_standstill(mode)
         if closed_form.horizon < horizon:  # the first segment with a new rate may end before its standstill
             end = closed_form.horizon
-            got = closed_form.next_standstill(mode)
-            assert got > end, (start, got, end)
+            standstill = closed_form.next_standstill(mode)
+            assert standstill > end, (start, standstill, end)
         if start.v == closed_form.a0 == segment.rate == 0.0:
-            assert got == inf
+            assert standstill == inf
             continue
         true = segment.turning_point(mode, mpf(horizon), catches=False)
-        assert (got < horizon) == (true is not None), (start, got, true)
+        assert (standstill < horizon) == (true is not None), (start, standstill, true)
         if true is not None:
             n_found += 1
             step = true * mpf(10) ** -20
             slope = abs(segment.at(true + step)[1] / step)
-            assert abs(got - true) <= ROUNDING * (true + largest_terms(start, true)[1] / slope), (start, got, true)
+            assert abs(standstill - true) <= ROUNDING * (true + largest_terms(start, true)[1] / slope), (
+                start,
+                standstill,
+                true,
+            )
     assert n_found > 5
 
 
@@ -286,9 +290,9 @@ def test_references_and_stability_accept_an_unstable_model(tmp_path):
     file = tmp_path / path.name
     file.write_text(path.read_text())
     file.with_suffix(".fmu").write_bytes(fmu("python").read_bytes())
-    done = commands.harness(tmp_path, "references", file, "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    (result,) = json.loads(done.stdout)
+    process = commands.harness(tmp_path, "references", file, "--json")
+    assert (process.returncode, process.stderr) == (0, "")
+    (result,) = json.loads(process.stdout)
     assert result["difference"] < 1e-9
     cases = [[case for case in group if case.title == "as it comes"] for group in grouped_cases(models=[str(file)])]
     rows = measure_stability([group for group in cases if group], lambda *_: None).outcomes

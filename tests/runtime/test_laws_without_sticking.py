@@ -53,13 +53,13 @@ def test_every_change_of_mode_is_counted_with_its_time(worker, backend_fmus, nam
 
 @pytest.mark.slow
 def test_the_events_of_the_threshold_law_are_those_of_the_certified_list(worker, backend_fmus):
-    certified = load_reference("stickslip-threshold").modes[1:]
+    certified_changes = load_reference("stickslip-threshold").modes[1:]
     fmu = worker.instantiate(backend_fmus / "stickslip.fmu")
     fmu.begin({"friction": THRESHOLD, "solver.method": ODE23, "solver.rtol": RTOL}, stop=16.0)
     changes = mode_changes([row[:2] for row in follow(fmu, 16.0, "events.count")])
-    assert [mode for _, mode in changes] == [mode for _, mode in certified]
-    assert [t for t, _ in changes] == pytest.approx([t for t, _ in certified], abs=1e-3)
-    assert fmu.get("events.count", "events.t_last") == [len(certified), changes[-1][0]]
+    assert [mode for _, mode in changes] == [mode for _, mode in certified_changes]
+    assert [t for t, _ in changes] == pytest.approx([t for t, _ in certified_changes], abs=1e-3)
+    assert fmu.get("events.count", "events.t_last") == [len(certified_changes), changes[-1][0]]
     fmu.free()
 
 

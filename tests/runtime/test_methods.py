@@ -95,8 +95,8 @@ def falls_with(power, error, h):
     return power - 0.5 < log2(error(h) / error(0.5 * h)) < power + 1.0
 
 
-def distance(one, other):
-    return max(fabs(p - q) for p, q in zip(one, other, strict=True))
+def distance(values, other_values):
+    return max(fabs(p - q) for p, q in zip(values, other_values, strict=True))
 
 
 def test_every_method_of_the_runtime_is_tested_here():
@@ -289,10 +289,10 @@ def test_rodas_meets_the_conditions_of_order_four_with_an_error_estimate_of_orde
     assert gamma.sum(1) == pytest.approx([numbers.D1, numbers.D2, numbers.D3, numbers.D4, 0.0, 0.0], abs=1e-14)
     three = [(1 + 0 * c, 1), (b, 2), (c**2, 3), (beta @ b, 6)]
     four = [(c**3, 4), (c * (alpha @ b), 8), (beta @ c**2, 12), (beta @ beta @ b, 24)]
-    weights, embedded = beta[5], alpha[5]
+    weights, embedded_weights = beta[5], alpha[5]
     assert [weights @ tree for tree, _ in three + four] == pytest.approx([1.0 / n for _, n in three + four], abs=1e-14)
-    assert [embedded @ tree for tree, _ in three] == pytest.approx([1.0 / n for _, n in three], abs=1e-14)
-    assert all(fabs(embedded @ tree - 1.0 / n) > 1e-3 for tree, n in four)
+    assert [embedded_weights @ tree for tree, _ in three] == pytest.approx([1.0 / n for _, n in three], abs=1e-14)
+    assert all(fabs(embedded_weights @ tree - 1.0 / n) > 1e-3 for tree, n in four)
 
 
 def test_rodas_refuses_a_step_with_a_singular_system():

@@ -85,21 +85,21 @@ def phase(block, mode, t, x, slip, stop):
         largest = (abs(block.k * x) + block.f_s) / block.m + block.v_s
         options = {"max_step": 0.1 * block.v_s / largest} if near else {}
         ends = [passes(0.0, -1), passes(limit * 1.01, 1)] if near else [passes(limit, -1)]
-        done = solve_ivp(
+        result = solve_ivp(
             rates, (t, stop), (x, slip), "DOP853", events=ends, rtol=3e-14, atol=1e-16, dense_output=True, **options
         )
-        assert done.status >= 0
-        pieces.append(done)
-        t, (x, slip) = done.t[-1], done.y[:, -1]
+        assert result.status >= 0
+        pieces.append(result)
+        t, (x, slip) = result.t[-1], result.y[:, -1]
 
         def position_at(time):
-            return float(next(one for one in pieces if time <= one.t[-1]).sol(time)[0])
+            return float(next(piece for piece in pieces if time <= piece.t[-1]).sol(time)[0])
 
-        if done.status == 0:
+        if result.status == 0:
             return position_at, stop, x, slip, mode
-        if near and done.t_events[0].size:
-            held = block.k * abs(x) <= block.f_s
-            return position_at, t, x, 0.0, 0 if held else -int(np.sign(x))
+        if near and result.t_events[0].size:
+            is_stuck = block.k * abs(x) <= block.f_s
+            return position_at, t, x, 0.0, 0 if is_stuck else -int(np.sign(x))
         near = not near
 
 

@@ -104,20 +104,20 @@ def puck(build):
 
 
 @pytest.fixture(scope="module")
-def shipped():
+def native_puck():
     require_compiler()
     return build_once("puck", *NATIVE) / "puck.fmu"
 
 
 @pytest.mark.parametrize(("F", "phi"), slow_after(3, SCENES))
-def test_body_comes_to_rest_as_the_closed_form_says(shipped, F, phi):
-    assert max(errors_at_rest(shipped, 1.0, F, 2.0, 1.0, phi)) < 1e-10
+def test_body_comes_to_rest_as_the_closed_form_says(native_puck, F, phi):
+    assert max(errors_at_rest(native_puck, 1.0, F, 2.0, 1.0, phi)) < 1e-10
 
 
 @pytest.mark.campaign
-def test_random_motions_come_to_rest_as_the_closed_form_says(shipped):
+def test_random_motions_come_to_rest_as_the_closed_form_says(native_puck):
     for scene in random_scenes(40):
-        assert max(errors_at_rest(shipped, *scene)) < 1e-9, scene
+        assert max(errors_at_rest(native_puck, *scene)) < 1e-9, scene
 
 
 @pytest.mark.parametrize("degrees", [0, 30, 77, 200])
@@ -125,9 +125,9 @@ def test_limit_is_a_circle(puck, degrees):
     angle = radians(degrees)
     for force in (2.0 - 1e-7, 2.0 + 1e-7):
         run = harness.simulate(puck, stop=1.0, inputs=constant(force * cos(angle), force * sin(angle), 1.0), rtol=1e-10)
-        moved, direction = hypot(run["x"][-1], run["y"][-1]), atan2(run["y"][-1], run["x"][-1])
-        assert moved == pytest.approx(max(0.0, 0.5 * (force - 2.0)), rel=1e-7)
-        assert moved == 0.0 or cos(direction - angle) == pytest.approx(1.0, abs=1e-15)
+        distance, direction = hypot(run["x"][-1], run["y"][-1]), atan2(run["y"][-1], run["x"][-1])
+        assert distance == pytest.approx(max(0.0, 0.5 * (force - 2.0)), rel=1e-7)
+        assert distance == 0.0 or cos(direction - angle) == pytest.approx(1.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("offset", slow_after(2, (0.0, 1e-6, 1e-12, 1e-9, 1e-3)))
@@ -163,17 +163,17 @@ def quarter_turns(puck, method):
 
 @pytest.mark.parametrize("method", slow_after(2, ("dop853", "radau9", "rodas", "ode23", "ode45")))
 def test_quarter_turn_of_the_plane_changes_no_bit(puck, method):
-    run, turned = quarter_turns(puck, method)
-    assert run.events.t.tolist() == turned.events.t.tolist()
+    run, turned_run = quarter_turns(puck, method)
+    assert run.events.t.tolist() == turned_run.events.t.tolist()
     assert len(run.events.t) > 1
-    assert run["x"].tolist() == turned["y"].tolist()
-    assert run["y"].tolist() == (-turned["x"]).tolist()
+    assert run["x"].tolist() == turned_run["y"].tolist()
+    assert run["y"].tolist() == (-turned_run["x"]).tolist()
 
 
 @pytest.mark.parametrize("v_belt", [0.171, 3.3, 1000.0])
-def test_body_rests_on_a_belt_as_on_a_plate(shipped, v_belt):
-    plate = harness.simulate(shipped, rtol=1e-8)
-    belt = harness.simulate(shipped, {"v_belt": v_belt, "v_x0": 2.0 + v_belt}, rtol=1e-8)
+def test_body_rests_on_a_belt_as_on_a_plate(native_puck, v_belt):
+    plate = harness.simulate(native_puck, rtol=1e-8)
+    belt = harness.simulate(native_puck, {"v_belt": v_belt, "v_x0": 2.0 + v_belt}, rtol=1e-8)
     assert belt.events.t == pytest.approx(plate.events.t, abs=1e-7)
     assert belt["x"][-1] - 2.5 * v_belt == pytest.approx(plate["x"][-1], abs=1e-7)
     assert (belt["v_x"][-1], belt["v_y"][-1]) == (v_belt, 0.0)
@@ -195,19 +195,19 @@ def test_body_on_a_belt_moves_as_on_a_table_that_stands_still(puck, build):
 @pytest.mark.campaign
 def test_two_bodies_in_a_plane_and_a_block_move_as_they_do_alone(puck, build):
     """Without the spring between them they are independent; with it, CVode is the second route."""
-    several = build("several", *NATIVE, more=SECOND + BLOCK)
+    fmu = build("several", *NATIVE, more=SECOND + BLOCK)
     start, force = {"v_x0": 0.5, "v_y0": 1.0}, constant(0.5, 0.3, 2.0)
-    alone = harness.simulate(puck, start, stop=2.0, inputs=force, rtol=1e-10)
-    run = harness.simulate(several, start | {"k_2": 0.0}, stop=2.0, inputs=force, rtol=1e-10)
-    assert (run["x"][-1], run["y"][-1]) == pytest.approx((alone["x"][-1], alone["y"][-1]), abs=1e-9)
-    assert run["mode"][-1] == alone["mode"][-1] == 0
+    single_run = harness.simulate(puck, start, stop=2.0, inputs=force, rtol=1e-10)
+    run = harness.simulate(fmu, start | {"k_2": 0.0}, stop=2.0, inputs=force, rtol=1e-10)
+    assert (run["x"][-1], run["y"][-1]) == pytest.approx((single_run["x"][-1], single_run["y"][-1]), abs=1e-9)
+    assert run["mode"][-1] == single_run["mode"][-1] == 0
     assert (run["z_x"][-1], run["z_y"][-1], run["second_mode"][-1]) == (0.2, 0.0, 0)
     start |= {"k_2": 50.0}
-    run = harness.simulate(several, start, stop=2.0, inputs=force, rtol=1e-10)
+    run = harness.simulate(fmu, start, stop=2.0, inputs=force, rtol=1e-10)
     inputs = np.array(list(zip(*force.values(), strict=True)), [(name, float) for name in force])
     names = ["x", "y", "z_x", "z_y", "z", "mode", "second_mode", "block_mode", "events.count"]
     other = fmpy.simulate_fmu(
-        several,
+        fmu,
         fmi_type="ModelExchange",
         start_values=start,
         input=inputs,
@@ -298,9 +298,9 @@ def test_pulled_body_sticks_and_slips_as_scipy_says(build):
 )
 def test_unsupported_contact_is_refused_by_name(tmp_path, parts, message):
     (tmp_path / "puck.py").write_text(puck_text(**parts))
-    done = commands.build("puck.py", folder=tmp_path)
-    assert done.returncode == 1
-    assert re.match(rf"Error: puck.py, line \d+: {message}", done.stderr), done.stderr
+    result = commands.build("puck.py", folder=tmp_path)
+    assert result.returncode == 1
+    assert re.match(rf"Error: puck.py, line \d+: {message}", result.stderr), result.stderr
 
 
 def test_directional_derivatives_are_those_of_the_formulas(puck):
@@ -308,7 +308,7 @@ def test_directional_derivatives_are_those_of_the_formulas(puck):
     references = {v.name: v.valueReference for v in description.modelVariables}
     unknowns = [references[name] for name in ("a_x", "a_y", "R.x", "R.y")]
     folder = extract(puck)
-    for speed, stuck in ((0.5, False), (0.0, True)):
+    for speed, is_stuck in ((0.5, False), (0.0, True)):
         fmu = FMU2Slave(
             guid=description.guid, unzipDirectory=folder, modelIdentifier="puck", instanceName="derivatives"
         )
@@ -318,10 +318,10 @@ def test_directional_derivatives_are_those_of_the_formulas(puck):
         fmu.enterInitializationMode()
         fmu.exitInitializationMode()
         by_force, by_speed = (
-            fmu.getDirectionalDerivative(unknowns, [references[known]], [1.0]) for known in ("F_x", "v_x")
+            fmu.getDirectionalDerivative(unknowns, [references[variable]], [1.0]) for variable in ("F_x", "v_x")
         )
-        turn = 0.0 if stuck else 2.0 / speed  # friction over speed
-        assert by_force == pytest.approx([0.0, 0.0, 1.0, 0.0] if stuck else [1.0, 0.0, 0.0, 0.0])
+        turn = 0.0 if is_stuck else 2.0 / speed  # friction over speed
+        assert by_force == pytest.approx([0.0, 0.0, 1.0, 0.0] if is_stuck else [1.0, 0.0, 0.0, 0.0])
         assert by_speed == pytest.approx([-0.64 * turn, -0.48 * turn, 0.64 * turn, 0.48 * turn])
         fmu.terminate()
         fmu.freeInstance()

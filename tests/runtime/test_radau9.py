@@ -69,7 +69,7 @@ def test_the_error_estimate_and_the_end_slope_are_those_of_collocation():
 # ---- one step
 
 
-class Damped:
+class DampedOscillator:
     """x'' = spring x + damper v, with a count of its evaluations."""
 
     has_dry_friction = has_conditions = False
@@ -103,28 +103,28 @@ def begin_step(model, tolerance):
 
 
 def test_radau9_reports_all_evaluations():
-    model = Damped(spring=-4.0, damper=-0.6)
-    _, reported = propose(model, 1.0, -0.3, 0.1)
-    assert reported == model.evaluations > 0
+    model = DampedOscillator(spring=-4.0, damper=-0.6)
+    _, evaluations = propose(model, 1.0, -0.3, 0.1)
+    assert evaluations == model.evaluations > 0
 
 
 def test_a_linear_system_takes_two_iterations():
-    model = Damped(spring=-4.0, damper=-600.0)
-    _, reported = propose(model, 1.0, -0.3, 0.1, tolerance=1e-6)
-    assert reported in (10, 11)  # one more where the error is estimated again
+    model = DampedOscillator(spring=-4.0, damper=-600.0)
+    _, evaluations = propose(model, 1.0, -0.3, 0.1, tolerance=1e-6)
+    assert evaluations in (10, 11)  # one more where the error is estimated again
 
 
 @pytest.mark.parametrize("rate", [1.0, 30.0, 1e3])
 def test_a_first_error_estimate_above_the_tolerance_is_filtered(rate):
     """For v' = -rate v, it is divided by 1 + GAMMA rate h once more."""
-    *_, plain = propose(Damped(damper=-rate), 0.0, 1.0, 1.0, tolerance=1.0)[0]
-    *_, filtered = propose(Damped(damper=-rate), 0.0, 1.0, 1.0, tolerance=1e-9)[0]
-    assert filtered == pytest.approx(plain / (1.0 + runtime("pacejka", "radau9").GAMMA * rate), rel=1e-6)
+    *_, error = propose(DampedOscillator(damper=-rate), 0.0, 1.0, 1.0, tolerance=1.0)[0]
+    *_, filtered_error = propose(DampedOscillator(damper=-rate), 0.0, 1.0, 1.0, tolerance=1e-9)[0]
+    assert filtered_error == pytest.approx(error / (1.0 + runtime("pacejka", "radau9").GAMMA * rate), rel=1e-6)
 
 
 def test_a_step_elsewhere_is_that_of_a_new_run():
     """As after an event: neither the polynomial nor the error of the steps before count."""
-    model = Damped(spring=-4.0, damper=-0.6)
+    model = DampedOscillator(spring=-4.0, damper=-0.6)
     step, used_method, new = begin_step(model, 1e-10), *(runtime("pacejka", "radau9").Radau9() for _ in range(2))
     control = step.active_method
 
@@ -139,7 +139,7 @@ def test_a_step_elsewhere_is_that_of_a_new_run():
     assert propose_elsewhere(used_method) == propose_elsewhere(new)
 
 
-class Growing(Damped):
+class Growing(DampedOscillator):
     """Its rates exceed what a step can follow."""
 
     def rates(self, t, x, v):
@@ -224,15 +224,15 @@ def test_no_step_passes_a_stop_because_a_steep_jacobian_hides_the_error(x_m):
 
 @pytest.mark.parametrize("rtol", [1e-6, *(pytest.param(rtol, marks=pytest.mark.slow) for rtol in (1e-3, 1e-9))])
 def test_radau9_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
-    (rows, steps), (others, more) = (
+    (rows, steps), (other_rows, other_steps) = (
         (rows, solver.steps + solver.rejected)
         for rows, solver in (
             integrate("pacejka", {"x_m": 1e-3, "solver.method": method, "solver.rtol": rtol}, 6.0)
             for method in (RADAU9, RODAS)
         )
     )
-    assert steps < more
-    assert relative_error(rows, truth(1e-3)) < relative_error(others, truth(1e-3))
+    assert steps < other_steps
+    assert relative_error(rows, truth(1e-3)) < relative_error(other_rows, truth(1e-3))
 
 
 # ---- friction with a kink

@@ -15,9 +15,9 @@ def test_two_settings_at_one_point_act_as_one(launch, case):
     internal, rows = launch(name, values, stop=stop).follow(
         0.0, stop, ["events.count"] if "events.count" in names else []
     )
-    changed = [t for t, before, after in zip(internal[1:], rows, rows[1:], strict=False) if after != before]
+    change_times = [t for t, before, after in zip(internal[1:], rows, rows[1:], strict=False) if after != before]
     fmu, now, last = launch(name, values, stop=stop), 0.0, {force: -size, "m": 0.3}
-    for t in sorted([share * stop for share in WHERE] + changed[:2]):
+    for t in sorted([share * stop for share in WHERE] + change_times[:2]):
         fmu.run([now, t][: 1 + (t > now)], [])
         now, state = t, fmu.save()
         for read in (False, True):

@@ -8,11 +8,11 @@ from variants import slow_after
 
 from fmus.compiler.lowering import lowered_model
 
-PUSHED = '''
+PUSHED_OSCILLATOR = '''
 from fmus import Contact, Mode, Model, Output, Parameter, State, cos
 
 
-class Pushed(Model):
+class PushedOscillator(Model):
     """Oscillator with friction, drive and integral of its position; a force B pushes it from rest for a moment."""
 
     m = Parameter(1.0, "kg", "mass", above=0.0)
@@ -115,7 +115,7 @@ def follow(cls, values, h_max, duration):
 )
 def test_a_motion_from_rest_has_the_same_bits_in_runs_of_any_length(model, method, push):
     values = {**push, "solver.method": method, "solver.rtol": 1e-5}
-    first, *others = [follow(model(PUSHED), values, h_max, 3.0) for h_max in (1e2, 1e4, 1e7)]
+    first, *others = [follow(model(PUSHED_OSCILLATOR), values, h_max, 3.0) for h_max in (1e2, 1e4, 1e7)]
     assert others == [first, first]
 
 
@@ -141,6 +141,6 @@ def test_an_axis_that_hunts_takes_no_more_steps_in_a_long_run(model, rtol):
 def test_a_push_that_decays_leaves_no_coarse_error_behind(model):
     """The first guess of the size of the speed is a thousand times what the axis does later."""
     values = {"B": 1000.0, "solver.method": ODE45, "solver.rtol": 1e-6}
-    fine = follow(model(PUSHED), {**values, "solver.method": DOP853, "solver.rtol": 1e-12}, 0.1, 5.0)
-    found = follow(model(PUSHED), values, 1e6, 5.0)
-    assert np.array(found[:2]) == pytest.approx(np.array(fine[:2]), abs=1e-5)
+    fine = follow(model(PUSHED_OSCILLATOR), {**values, "solver.method": DOP853, "solver.rtol": 1e-12}, 0.1, 5.0)
+    coarse = follow(model(PUSHED_OSCILLATOR), values, 1e6, 5.0)
+    assert np.array(coarse[:2]) == pytest.approx(np.array(fine[:2]), abs=1e-5)

@@ -39,7 +39,7 @@ NUMERICS = {
 NUMERICS["active_method"] = lowered_files("smd")["runtime/active_method.py"]
 LIBM = "acos asin atan atan2 copysign cos cosh exp expm1 fabs fmod log log1p pow sin sinh sqrt tan tanh"
 MATH = {*LIBM.split(), "floor", "ceil", "isfinite", "isinf", "isnan", "inf", "nan", "pi", "radians"}
-BANNED = (
+BANNED_NODES = (
     *(ast.Raise, ast.Try, ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp, ast.JoinedStr),
     *(ast.With, ast.Yield, ast.YieldFrom, ast.Await, ast.Global, ast.Nonlocal, ast.Dict, ast.Set),
     *(ast.FunctionDef, ast.ClassDef, ast.Import, ast.ImportFrom, ast.Assert, ast.Delete),
@@ -83,7 +83,7 @@ def test_the_numerics_stay_within_the_c_subset(name):
     for function in functions(tree):
         for node in inside(function):
             line = f"{name}.py, line {getattr(node, 'lineno', function.lineno)}"
-            assert not isinstance(node, BANNED), f"{line}: {type(node).__name__}"
+            assert not isinstance(node, BANNED_NODES), f"{line}: {type(node).__name__}"
             if isinstance(node, ast.Constant):
                 assert isinstance(node.value, (bool, int, float)), f"{line}: {node.value!r} is no number"
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
@@ -125,15 +125,15 @@ def read(instance, *names):
     ]
 
 
-def number_paths(owner, path, seen):
+def number_paths(owner, path, seen_ids):
     """Return path and type of every number in an object, which must own all its objects alone."""
-    assert id(owner) not in seen, f"{path} is owned twice"
-    seen.add(id(owner))
+    assert id(owner) not in seen_ids, f"{path} is owned twice"
+    seen_ids.add(id(owner))
     numbers = {}
     for name, value in vars(owner).items():
         member_path = f"{path}.{name}"
         if hasattr(value, "__dict__"):
-            numbers |= number_paths(value, member_path, seen)
+            numbers |= number_paths(value, member_path, seen_ids)
         elif isinstance(value, list):
             numbers[member_path] = (len(value), *map(type, value))
         else:
@@ -188,11 +188,11 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
     instance = slave(name)
     assert instance.do_step(0.0, 0.1)
 
-    def broken(*_):
+    def raise_error(*_):
         raise RuntimeError("100 % broken")
 
-    monkeypatch.setattr(type(instance.model), "compute_outputs", broken)
-    monkeypatch.setattr(type(instance.model), "prepare", broken)
+    monkeypatch.setattr(type(instance.model), "compute_outputs", raise_error)
+    monkeypatch.setattr(type(instance.model), "prepare", raise_error)
     instance.set_real([list(declarations_of(name)).index("m")], [2.0])
     assert instance.do_step(0.1, 0.1) is False
     assert all(isnan(value) for value in read(instance, *[v for v in outputs(name) if v != "mode"]))
@@ -205,14 +205,14 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_run_whose_initialisation_ends_twice_continues(name):
-    once, finished_twice = slave(name), slave(name)
-    for instance in once, finished_twice:
+    finished_once, finished_twice = slave(name), slave(name)
+    for instance in finished_once, finished_twice:
         assert instance.do_step(0.0, 0.1)
     finished_twice.exit_initialization_mode()
-    assert read(finished_twice, *outputs(name)) == read(once, *outputs(name))
-    for instance in once, finished_twice:
+    assert read(finished_twice, *outputs(name)) == read(finished_once, *outputs(name))
+    for instance in finished_once, finished_twice:
         assert instance.do_step(0.1, 0.1)
-    assert read(finished_twice, *outputs(name)) == pytest.approx(read(once, *outputs(name)), rel=1e-4)
+    assert read(finished_twice, *outputs(name)) == pytest.approx(read(finished_once, *outputs(name)), rel=1e-4)
 
 
 def test_cached_reference_lists_are_bounded():
@@ -272,8 +272,8 @@ def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
     ids=lambda source: getattr(source, "stem", source),
 )
 def test_a_model_owns_numbers_only_and_no_part_of_the_solver(source):
-    owned = {type(value) for value in vars(lowered_model(source)()).values()}
-    assert {kind.__name__ for kind in owned} <= {"bool", "float", "int", "list", "InputPolynomial"}
+    value_types = {type(value) for value in vars(lowered_model(source)()).values()}
+    assert {kind.__name__ for kind in value_types} <= {"bool", "float", "int", "list", "InputPolynomial"}
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -10,12 +10,12 @@ from models import DOP853, ODE23, ODE45, RODAS
 from native_fmus import require_compiler
 
 STOP = 5.0
-SHAKEN = '''"""Block at rest under a harmonic force."""
+SHAKEN_BLOCK = '''"""Block at rest under a harmonic force."""
 
 from fmus import Contact, Mode, Model, Output, Parameter, State, sin
 
 
-class Shaken(Model):
+class ShakenBlock(Model):
     """Block under a harmonic force: m a = F - F_friction."""
 
     m = Parameter(1.0, "kg", "mass", above=0.0)
@@ -37,7 +37,7 @@ class Shaken(Model):
 
 
 @dataclass(frozen=True)
-class Shaken:
+class ShakenBlock:
     """Parameters of the block under a harmonic force, in SI units; its peaks exceed the limit by the share `excess`."""
 
     m: float
@@ -52,7 +52,7 @@ class Shaken:
         return {name: value for name, value in asdict(self).items() if name != "excess"}
 
 
-def shaken(number=200, seed=1, excesses=(1e-8, 1e-1)):
+def draw_shaken_blocks(number=200, seed=1, excesses=(1e-8, 1e-1)):
     """Return random blocks under a harmonic force whose amplitude lies above or below the static limit by random
     shares."""
     draw = Random(f"shaken {seed}")
@@ -61,7 +61,7 @@ def shaken(number=200, seed=1, excesses=(1e-8, 1e-1)):
     for _ in range(number):
         f_d, ratio, excess = draw.uniform(1.0, 5.0), draw.uniform(1.0, 1.5), 10.0 ** draw.uniform(low, high)
         excess *= -0.5 if draw.random() < 0.5 else 1.0
-        blocks.append(Shaken(1.0, f_d, ratio, ratio * f_d * (1.0 + excess), draw.uniform(2.0, 40.0), excess))
+        blocks.append(ShakenBlock(1.0, f_d, ratio, ratio * f_d * (1.0 + excess), draw.uniform(2.0, 40.0), excess))
     return blocks
 
 
@@ -69,11 +69,11 @@ def shaken(number=200, seed=1, excesses=(1e-8, 1e-1)):
 def test_a_block_breaks_away_at_the_first_peak_of_the_load(worker, tmp_path, method):
     """Nothing moves but the phase angle, so that the error control allows steps of many periods."""
     require_compiler()
-    (file := tmp_path / "shaken_at_rest.py").write_text(SHAKEN)
+    (file := tmp_path / "shaken_at_rest.py").write_text(SHAKEN_BLOCK)
     words = ("--native", "--platform", "linux64")
     fmu = worker.instantiate(build_user_model(file, *words) / "native" / "shaken_at_rest.fmu")
     wrong = []
-    for parameters in shaken(60, excesses=(1e-4, 1.0)):
+    for parameters in draw_shaken_blocks(60, excesses=(1e-4, 1.0)):
         end = 1.5 * math.pi / parameters.Omega  # behind the first peak, before the next one
         fmu.reset()
         fmu.begin({**parameters.values(), "solver.method": method, "solver.rtol": 1e-6}, stop=STOP)

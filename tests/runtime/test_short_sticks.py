@@ -299,10 +299,10 @@ class StackPhase:
     slips = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0, 0.0, 0.0]])
 
     def __init__(self, p, modes):
-        one = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        constant = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         back, pull = np.array([-p.c, 0.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, -p.k, 0.0, p.k, 0.0])
-        first, second = modes[0] * p.f1 * one, modes[1] * p.f2 * one
-        zero = 0.0 * one
+        first, second = modes[0] * p.f1 * constant, modes[1] * p.f2 * constant
+        zero = 0.0 * constant
         if modes == (0, 0):
             a1, a2, second = zero, zero, pull
             first = back + pull
@@ -312,14 +312,14 @@ class StackPhase:
         else:
             a2 = (pull - second) / p.m2
             first, a1 = (first, (back + second - first) / p.m1) if modes[0] else (back + second, zero)
-        self.rates = np.array([[0.0, 1.0, 0, 0, 0, 0], a1, [0.0, 0, 0, 1.0, 0, 0], a2, p.v_driver * one, zero])
+        self.rates = np.array([[0.0, 1.0, 0, 0, 0, 0], a1, [0.0, 0, 0, 1.0, 0, 0], a2, p.v_driver * constant, zero])
         self.forces, holds = np.array([first, second]), (p.ratio * p.f1, p.ratio * p.f2)
         self.guards = []  # contact, its direction after the end of the mode, row of the guard, its scale
         for i in range(2):
             if modes[i]:
                 self.guards.append((i, 0, modes[i] * self.slips[i], None))
             else:
-                self.guards += [(i, side, holds[i] * one - side * self.forces[i], holds[i]) for side in (-1, 1)]
+                self.guards += [(i, side, holds[i] * constant - side * self.forces[i], holds[i]) for side in (-1, 1)]
 
     def follow(self, row, y):
         """Return the value of a row as a function of the time since the state y."""
@@ -425,7 +425,7 @@ def modes_after(p, y, modes, i, side, t, dips, n_events):
     if modes[1] == 0:
         y[3] = y[1] = 0.0 if modes[0] == 0 else (p.m1 * y[1] + p.m2 * y[3]) / (p.m1 + p.m2)
     holds = (p.ratio * p.f1, p.ratio * p.f2)
-    released = {i} if side else set()
+    released_contacts = {i} if side else set()
     while True:
         phase = StackPhase(p, modes)
         loads = phase.forces @ y
@@ -437,9 +437,9 @@ def modes_after(p, y, modes, i, side, t, dips, n_events):
         if len(over) > 1:
             raise AmbiguousError
         modes = tuple(int(np.sign(loads[j])) if j in over else mode for j, mode in enumerate(modes))
-        released.update(over)
+        released_contacts.update(over)
     accelerations = phase.slips @ phase.rates @ y
-    if any(modes[j] * accelerations[j] <= 0.0 for j in released):
+    if any(modes[j] * accelerations[j] <= 0.0 for j in released_contacts):
         raise AmbiguousError
     return y, modes
 
@@ -546,7 +546,7 @@ def chosen_sled(draw, depth):
     return sled, 15
 
 
-def chosen(kind, number, seed=1, depths=(1e-10, 1e-2)):
+def choose_motions(kind, number, seed=1, depths=(1e-10, 1e-2)):
     """Return blocks on a belt ("belt") or sleds whose dips have random relative depths, and their motions."""
     draw = Random(f"chosen {kind} {seed}")
     low, high = (float(mp.log10(depth)) for depth in depths)
@@ -615,7 +615,7 @@ def cases(model):
         return stacks(1.02, 3) + stacks(1.005, 5)
     randoms = belts if model == "belt" else sleds
     random_cases = [case for ratio in (1.02, 1.01, 1.005) for case in randoms(ratio, 10)]
-    return random_cases + chosen(model, 40, depths=(1e-9, 1e-2))
+    return random_cases + choose_motions(model, 40, depths=(1e-9, 1e-2))
 
 
 def wrong_sets(worker, path, model, method, rtol):
@@ -627,8 +627,8 @@ def wrong_sets(worker, path, model, method, rtol):
         fmu.reset()
         fmu.begin({**parameters.values(), "solver.method": method, "solver.rtol": rtol}, stop=motion.stop)
         rows = fmu.run([0.0, *(t for t, _, _ in points)], ["events.count", *MODES[model]])[1:]
-        for (t, n_events, modes), (n_found, *present) in zip(points, rows, strict=True):
-            if n_found != n_events or (modes and tuple(present) != modes):
+        for (t, n_events, modes), (n_found, *present_modes) in zip(points, rows, strict=True):
+            if n_found != n_events or (modes and tuple(present_modes) != modes):
                 wrong.append((t, n_events, n_found, parameters))
                 break
     fmu.free()

@@ -23,7 +23,7 @@ def kind(request):
     return request.param
 
 
-def built(name, kind):
+def build_fmu(name, kind):
     return build_once(name, *KINDS[kind]) / f"{name}.fmu"
 
 
@@ -39,14 +39,16 @@ def test_events_are_the_same_from_any_start_time(worker, name, kind):
     model = scalar_class(name)
     modes = [*model().contacts]
     first, *others = (
-        follow_events(worker.instantiate(built(name, kind)), start, start + model.stop_time, modes)
+        follow_events(worker.instantiate(build_fmu(name, kind)), start, start + model.stop_time, modes)
         for start in (0.0, *STARTS)
     )
     assert len(first) >= 5
     for start, events in zip(STARTS, others, strict=True):
         assert [row[1:] for row in events] == [row[1:] for row in first]
-        place = ulp(max(abs(start), abs(start + model.stop_time)))
-        assert all(abs(t - start - time) <= PLACES * place for (t, *_), (time, *_) in zip(events, first, strict=True))
+        last_place = ulp(max(abs(start), abs(start + model.stop_time)))
+        assert all(
+            abs(t - start - time) <= PLACES * last_place for (t, *_), (time, *_) in zip(events, first, strict=True)
+        )
 
 
 @pytest.mark.slow
@@ -54,7 +56,7 @@ def test_every_period_of_a_long_run_has_the_same_events(worker):
     """The motor of the joint comes to rest in every period, however late in the run."""
     require_compiler()
     period, stop = 2.0, 300.0
-    events = follow_events(worker.instantiate(built("joint", "native")), 0.0, stop, ["mode_m", "mode_l"])
+    events = follow_events(worker.instantiate(build_fmu("joint", "native")), 0.0, stop, ["mode_m", "mode_l"])
     counts = Counter(t // period for t, *_ in events)
     assert {counts[n] for n in range(2, int(stop / period) - 1)} == {8}
 
@@ -63,14 +65,14 @@ def test_events_that_a_late_time_cannot_tell_apart_are_passed_in_order(worker, k
     """At 1e15 s, whose neighbours are 1/8 s away, solver.t_next still leads to the stop time."""
     start, stop = 1e15, 1e15 + 8.0
     modes = [*scalar_class("stacked")().contacts]
-    late = follow_events(worker.instantiate(built("stacked", kind)), start, stop, modes)
+    late = follow_events(worker.instantiate(build_fmu("stacked", kind)), start, stop, modes)
     assert late
     assert all(start <= t <= stop for t, *_ in late)
     assert [row[0] for row in late] == sorted(row[0] for row in late)
 
 
 def test_messages_and_statistics_name_the_time_of_the_importer(worker, kind):
-    fmu = worker.instantiate(built("sleds", kind))
+    fmu = worker.instantiate(build_fmu("sleds", kind))
     fmu.begin(start=1000.0, stop=1002.0)
     assert fmu.get("events.t_last") == 1000.0
     fmu.step(1000.0, 0.5)

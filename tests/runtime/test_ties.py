@@ -130,8 +130,8 @@ def random_sled(draw):
     if friction == "weightless":
         values["g"] = 0.0
     start = draw.choice([0.0, draw.uniform(-10.0, 100.0), 1e4, 1e6])
-    held = values["mu_s"] * values["m"] * values["g"] / (values["k"] * abs(values["v_driver"]))
-    return values, start, start + held + 20.3 * 6.283185307179586 * (values["m"] / values["k"]) ** 0.5
+    stick_time = values["mu_s"] * values["m"] * values["g"] / (values["k"] * abs(values["v_driver"]))
+    return values, start, start + stick_time + 20.3 * 6.283185307179586 * (values["m"] / values["k"]) ** 0.5
 
 
 def test_speeds_that_touch_zero_continue_for_any_values(pair):

@@ -65,20 +65,20 @@ POINTS = [STOP * i / 100 for i in range(101)]
 
 
 @pytest.fixture
-def built(tmp_path):
-    """Return built(name, kind), the path of an FMU, which is built once per test run."""
+def build_fmu(tmp_path):
+    """Return build_fmu(name, kind), the path of an FMU, which is built once per test run."""
 
-    def built(name, kind):
+    def build_fmu(name, kind):
         if kind == "native":
             require_compiler()
         folder, words = KINDS[kind]
         lines = MODEL.format(name=name.title().replace("_", ""), contacts=CONTACTS[name]).splitlines(keepends=True)
-        unused = ("    p =", "    limit =") if name == "lifting_block" else ()
+        unused_lines = ("    p =", "    limit =") if name == "lifting_block" else ()
         file = tmp_path / f"{name}.py"
-        file.write_text("".join(line for line in lines if not line.startswith(unused)))
+        file.write_text("".join(line for line in lines if not line.startswith(unused_lines)))
         return build_user_model(file, *words, *LABELS) / folder / f"{name}.fmu"
 
-    return built
+    return build_fmu
 
 
 def changes(fmu, values, method, rtol):
@@ -92,9 +92,9 @@ def changes(fmu, values, method, rtol):
 @pytest.mark.campaign
 @pytest.mark.parametrize("kind", [pytest.param("python", marks=pytest.mark.campaign), "native"])
 @pytest.mark.parametrize("name", ["touching_block", "touching_stack"])
-def test_a_contact_at_rest_stays_stuck_where_its_limit_touches_the_load(worker, built, name, kind):
+def test_a_contact_at_rest_stays_stuck_where_its_limit_touches_the_load(worker, build_fmu, name, kind):
     """The exact answer: no event, no motion."""
-    fmu = worker.instantiate(built(name, kind))
+    fmu = worker.instantiate(build_fmu(name, kind))
     for values in TOUCHES:
         for method in METHODS:
             for rtol in TOLERANCES:
@@ -107,8 +107,8 @@ def test_a_contact_at_rest_stays_stuck_where_its_limit_touches_the_load(worker, 
 
 @pytest.mark.parametrize(("solver", "tolerances"), [("CVode", (1e-3, 1e-9)), ("Euler", (1e-3,))])
 @pytest.mark.parametrize("name", slow_after(1, ["touching_stack", "touching_block"]))
-def test_it_stays_stuck_in_model_exchange(worker, built, name, solver, tolerances):
-    path = built(name, "native")
+def test_it_stays_stuck_in_model_exchange(worker, build_fmu, name, solver, tolerances):
+    path = build_fmu(name, "native")
     for values in TOUCHES:
         for rtol in tolerances:
             options = {"solver": solver, "step_size": 1e-3, "output_interval": 2e-2, "relative_tolerance": rtol}
@@ -139,11 +139,11 @@ def solve_dips(push):
 @pytest.mark.campaign
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("depth", [0.3, pytest.param(0.01, marks=pytest.mark.campaign)])
-def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, built, depth, kind):
+def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, build_fmu, depth, kind):
     values = {"p": P, "push": P * (1.0 + depth), "angle0": np.pi}
     expected, x = solve_dips(values["push"])
     assert len(expected) >= 10
-    fmu = worker.instantiate(built("touching_block", kind))
+    fmu = worker.instantiate(build_fmu("touching_block", kind))
     for method in METHODS:
         for rtol in TOLERANCES if kind == "native" else (1e-3, 1e-6):  # the bits are the same
             events = changes(fmu, values, method, rtol)
@@ -155,9 +155,9 @@ def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, built, d
 
 
 @pytest.mark.parametrize("kind", campaign_after(1, KINDS))
-def test_friction_that_vanishes_for_longer_ends_mode_0(worker, built, kind):
+def test_friction_that_vanishes_for_longer_ends_mode_0(worker, build_fmu, kind):
     """It vanishes while cos(angle) > 0.5: from -60 to 60 degrees of each turn."""
-    fmu = worker.instantiate(built("lifting_block", kind))
+    fmu = worker.instantiate(build_fmu("lifting_block", kind))
     angles = np.pi * np.add.outer(2.0 * np.arange(7), [2.0 / 3.0, 4.0 / 3.0]).ravel()  # since the start
     expected = angles[angles < OMEGA * STOP] / OMEGA
     for method in METHODS:

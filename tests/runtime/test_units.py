@@ -25,17 +25,17 @@ def factor(unit, length, time, mass):
 def run(worker, fmus, name, method, *exponents):
     """Return the rows of all internal steps of a run in scaled units, in the units of the model."""
     model = scalar_class(name)()
-    declared = dict(variables(model))
+    declarations = dict(variables(model))
     values = {
         variable: meaning.start * factor(meaning.unit, *exponents)
-        for variable, meaning in declared.items()
+        for variable, meaning in declarations.items()
         if meaning.causality in ("parameter", "input") and meaning.type == "Real"
     }
     stop = model.stop_time * factor("s", *exponents)
     fmu = worker.instantiate((build_once("--more") if name in MORE else fmus) / f"{name}.fmu")
     fmu.begin(values | ({"solver.method": method} if method else {}), stop=stop)
     columns = [*model.states, "events.t_last"]
-    factors = [factor(declared[state].unit, *exponents) for state in model.states] + [factor("s", *exponents)]
+    factors = [factor(declarations[state].unit, *exponents) for state in model.states] + [factor("s", *exponents)]
     names = [*columns, *model.contacts, "events.count", "solver.steps", "solver.rejected", "solver.evaluations"]
     times, rows = fmu.follow(0.0, stop, names)
     fmu.free()
@@ -80,14 +80,14 @@ RUNS = [
 
 
 @pytest.fixture(scope="module")
-def unscaled():
+def unscaled_rows():
     """Rows of runs in the units of the model, by name and method."""
     return {}
 
 
 @pytest.mark.parametrize(("name", "method", "length", "time", "mass"), RUNS)
-def test_scaled_units_give_the_same_bits(worker, fmus, unscaled, name, method, length, time, mass):
+def test_scaled_units_give_the_same_bits(worker, fmus, unscaled_rows, name, method, length, time, mass):
     """All exponents are of two, so that a change of units rounds nothing."""
-    if (name, method) not in unscaled:
-        unscaled[name, method] = run(worker, fmus, name, method, 0, 0, 0)
-    assert run(worker, fmus, name, method, length, time, mass) == unscaled[name, method]
+    if (name, method) not in unscaled_rows:
+        unscaled_rows[name, method] = run(worker, fmus, name, method, 0, 0, 0)
+    assert run(worker, fmus, name, method, length, time, mass) == unscaled_rows[name, method]
