@@ -33,10 +33,10 @@ def run(external_fmu_folder, tmp_path):
 
     def run(name, *arguments, figures=False):
         fmu = name if name.endswith(".fmu") else external_fmu_folder / f"{name}.fmu"
-        done = commands.harness(tmp_path, "run", fmu, *arguments, COLUMNS="120", figures=figures)
-        assert "Traceback" not in done.stderr
-        assert "np." not in done.stdout + done.stderr
-        return done, table(tmp_path / "results" / name.removesuffix(".fmu") / "trajectory.csv")
+        result = commands.harness(tmp_path, "run", fmu, *arguments, COLUMNS="120", figures=figures)
+        assert "Traceback" not in result.stderr
+        assert "np." not in result.stdout + result.stderr
+        return result, table(tmp_path / "results" / name.removesuffix(".fmu") / "trajectory.csv")
 
     return run
 
@@ -53,24 +53,24 @@ def table(file):
     }
 
 
-def assert_succeeded(done):
-    assert (done.returncode, done.stderr) == (0, "")
+def assert_succeeded(result):
+    assert (result.returncode, result.stderr) == (0, "")
 
 
-def assert_refused(done, status, *sentences):
-    assert done.returncode == status
-    assert done.stderr.startswith("Error: ")
-    assert done.stderr.count("Error: ") == 1
+def assert_refused(result, status, *sentences):
+    assert result.returncode == status
+    assert result.stderr.startswith("Error: ")
+    assert result.stderr.count("Error: ") == 1
     for sentence in sentences:
-        assert sentence in done.stderr
+        assert sentence in result.stderr
 
 
 @pytest.mark.parametrize("name", slow_after(1, ["Midpoint", "Fmi3Midpoint", "ModelExchangeOnly"]))
 @pytest.mark.parametrize("tolerance", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, tolerance):
-    done, rows = run(name, "--set", "k=50", "--rtol", tolerance)
-    assert_succeeded(done)
-    assert "changes no output by more than" in done.stdout
+    result, rows = run(name, "--set", "k=50", "--rtol", tolerance)
+    assert_succeeded(result)
+    assert "changes no output by more than" in result.stdout
     time, position, *_ = rows.values()
     assert time[-1] == 1.0
     assert np.abs(position - np.cos(sqrt(50) * time)).max() < 2 * tolerance
@@ -79,8 +79,8 @@ def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, 
 def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
     """FMI 2.0: after bounce n the ball rises with e^n times the speed of its first fall."""
     e, g = 0.8, 9.81
-    done, rows = run("Bouncing", "--set", f"e={e}")
-    assert_succeeded(done)
+    result, rows = run("Bouncing", "--set", f"e={e}")
+    assert_succeeded(result)
     fall = sqrt(2 / g)
     bounces = fall + 2 * fall * np.cumsum([0, *(e**n for n in (1, 2))])
     since = rows["t [s]"][-1] - bounces[-1]
@@ -94,8 +94,8 @@ def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
 def test_clocks_tick_at_their_times_in_event_mode(run, interface):
     """x = e^(-2 t). The FMU refuses ticks at other times, steps past a tick, and reading without an active clock."""
-    done, rows = run("Ticking", "--interface", interface)
-    assert_succeeded(done)
+    result, rows = run("Ticking", "--interface", interface)
+    assert_succeeded(result)
     ticks = {"samples": 0.05 + 0.1 * np.arange(10), "growths": [0.125, 0.375, 0.875], "timed_out": [0.25 + 0.07]}
     for name, times in ticks.items():
         assert rows["t [s]"][1:][np.diff(rows[name]) != 0] == pytest.approx(times, abs=1e-12)
@@ -110,50 +110,52 @@ def test_clocks_that_cannot_tick_are_refused(run, external_fmu_folder, tmp_path)
         copy = external_fmus.edited_copy(external_fmu_folder / "Ticking.fmu", tmp_path / "Ticking.fmu", edit)
         return run(str(copy), *arguments)
 
-    done, _ = run_edited('hasEventMode="true"', "")
-    assert_refused(done, 1, "(sample, timeout, growing, fifth), but no event mode; use --interface ModelExchange")
+    result, _ = run_edited('hasEventMode="true"', "")
+    assert_refused(result, 1, "(sample, timeout, growing, fifth), but no event mode; use --interface ModelExchange")
     name, countdown = 'name="timeout" ', 'intervalVariability="countdown"'
-    triggered = 'causality="input" variability="discrete" intervalVariability="triggered"'
-    done, _ = run_edited(
+    triggered_attributes = 'causality="input" variability="discrete" intervalVariability="triggered"'
+    result, _ = run_edited(
         f'{name}valueReference="10" causality="input" variability="discrete" {countdown}',
-        f'{name}valueReference="10" {triggered}',
+        f'{name}valueReference="10" {triggered_attributes}',
     )
-    assert_refused(done, 1, "Ticking has triggered input clocks (timeout), which only another FMU can tick")
-    done, _ = run_edited('intervalDecimal="0.1"', 'intervalDecimal="0"')
-    assert_refused(done, 1, "its clock sample has an interval of 0.0 s; it must be positive")
+    assert_refused(result, 1, "Ticking has triggered input clocks (timeout), which only another FMU can tick")
+    result, _ = run_edited('intervalDecimal="0.1"', 'intervalDecimal="0"')
+    assert_refused(result, 1, "its clock sample has an interval of 0.0 s; it must be positive")
     (tmp_path / "x.csv").write_text("time,x\n" + "".join(f"{0.1 * i},{exp(-0.2 * i)}\n" for i in range(21)))
-    done = commands.harness(tmp_path, "fit", external_fmu_folder / "Ticking.fmu", "x.csv", "--free", "k")
+    result = commands.harness(tmp_path, "fit", external_fmu_folder / "Ticking.fmu", "x.csv", "--free", "k")
     assert_refused(
-        done, 1, "it has clocks (sample, timeout, growing, fifth), which only single runs, comparisons and sweeps tick"
+        result,
+        1,
+        "it has clocks (sample, timeout, growing, fifth), which only single runs, comparisons and sweeps tick",
     )
 
 
 def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such_also_in_its_result(run, tmp_path):
-    done, rows = run("FixedStep")
-    assert_succeeded(done)
+    result, rows = run("FixedStep")
+    assert_succeeded(result)
     note = "fixed internal step of 0.1 s, error unknown"
-    assert note in done.stdout
+    assert note in result.stdout
     assert note in load_result(tmp_path / "results/FixedStep").note
     assert rows["x"][-1] == pytest.approx(0.9**100)  # 41 % off
     assert abs(0.9**100 / exp(-10) - 1) > 0.4
 
 
 def test_booleans_integers_and_strings_are_recorded_drawn_and_set(run, tmp_path):
-    done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007", figures=True)
-    assert_succeeded(done)
+    result, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007", figures=True)
+    assert_succeeded(result)
     assert (tmp_path / "results/Switching/figure.svg").is_file()
     assert {*rows["on"]} == {0, 1}
     assert rows["switched"][-1] == 3
     assert {*rows["says"]} == {"cold", "007 cold", "007 warm"}
-    assert re.search(r"^says +cold +007 ", done.stdout, re.M)
-    done, rows = run("Switching", "--set", "enabled=FALSE", "--set", "most=3.0")
-    assert_succeeded(done)
+    assert re.search(r"^says +cold +007 ", result.stdout, re.M)
+    result, rows = run("Switching", "--set", "enabled=FALSE", "--set", "most=3.0")
+    assert_succeeded(result)
     assert not rows["on"][-1]
 
 
 def test_arrays_and_enumerations_are_recorded_elementwise_and_set(run):
-    done, rows = run("Arrays", "--set", "begin=0,2", "--set", "sense=right", "--set", "omega=1.5")
-    assert_succeeded(done)
+    result, rows = run("Arrays", "--set", "begin=0,2", "--set", "sense=right", "--set", "omega=1.5")
+    assert_succeeded(result)
     turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
     assert [*rows] == ["t [s]", *turn, "place[1]", "place[2]", "going", "says"]
     assert rows["place[1]"][-1] == pytest.approx(2 * sin(1.5))
@@ -186,8 +188,8 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
         SCENE.format(fmu=external_fmu_folder / f"{name}.fmu", outputs=outputs, more=more)
     )
     without_strings = name != "Arrays"  # whose strings and elements are drawn
-    done = commands.harness(tmp_path, "run", "mine.toml", figures=not without_strings, COLUMNS="120")
-    assert_succeeded(done)
+    result = commands.harness(tmp_path, "run", "mine.toml", figures=not without_strings, COLUMNS="120")
+    assert_succeeded(result)
     rows = table(tmp_path / "results/mine/trajectory.csv")
     turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
     assert [*rows][1:] == (columns or ["place[2]", "says", *turn])
@@ -195,7 +197,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
         assert len(rows["t [s]"]) == 101
         assert rows["place[2]"][-1] == pytest.approx(2 * cos(3))
     assert (tmp_path / "results/mine/figure.svg").is_file()
-    assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
+    assert "error unknown" in result.stdout or "changes no output by more than" in result.stdout
     assert "the same, bit for bit" in commands.harness(tmp_path, "run", "mine.toml", COLUMNS="120").stdout
 
 
@@ -217,9 +219,9 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
     ],
 )
 def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run, name, arguments, end, message):
-    done, rows = run(name, *arguments)
+    result, rows = run(name, *arguments)
     assert_refused(
-        done,
+        result,
         1,
         f"{name}.fmu: it terminated the simulation: ",
         message,
@@ -246,9 +248,9 @@ def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run,
     ],
 )
 def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run, kind, message):
-    done, rows = run("Faulty", "--set", f"kind={kind}", "--timeout", "4")
-    assert_refused(done, 1, f"Faulty.fmu: {message}")
-    assert done.stderr.count("\n") == 1
+    result, rows = run("Faulty", "--set", f"kind={kind}", "--timeout", "4")
+    assert_refused(result, 1, f"Faulty.fmu: {message}")
+    assert result.stderr.count("\n") == 1
     assert rows["t [s]"][-1] == 0.5
     assert (rows["x"] == rows["t [s]"]).all()
 
@@ -265,23 +267,23 @@ def test_the_longest_of_the_refinement_runs_is_kept(run, external_fmu_folder, tm
     crash = "if h < 0.01 and t > 0.25:\n            import os; os.kill(os.getpid(), 11)\n        x, v ="
     changes = {"resources/Midpoint.py": lambda text: text.replace("x, v =", crash, 1)}
     external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "Midpoint.fmu", changes)
-    done, rows = run(str(tmp_path / "Midpoint.fmu"))
-    assert_refused(done, 1, "its binary crashed (Segmentation fault), after t = 1 s")
+    result, rows = run(str(tmp_path / "Midpoint.fmu"))
+    assert_refused(result, 1, "its binary crashed (Segmentation fault), after t = 1 s")
     assert rows is None
     assert len(load_result(tmp_path / "results/Midpoint").time) == 65
 
 
 def test_the_output_of_an_fmu_is_reported_and_harmless(run):
-    done, rows = run("Faulty", "--set", "kind=4", "--json")
-    assert_succeeded(done)
-    assert "it printed: I am at 1.0" in json.loads(done.stdout)["note"]
+    result, rows = run("Faulty", "--set", "kind=4", "--json")
+    assert_succeeded(result)
+    assert "it printed: I am at 1.0" in json.loads(result.stdout)["note"]
     assert rows["x"][-1] == 1.0
 
 
 def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
-    done, rows = run("NonConforming")
+    result, rows = run("NonConforming")
     assert_refused(
-        done,
+        result,
         1,
         "NonConforming.fmu violates the FMI standard in 2 places:",
         '"count" (line 16)',
@@ -289,8 +291,8 @@ def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
         "--lenient",
     )
     assert rows is None
-    done, rows = run("NonConforming", "--lenient")
-    assert_succeeded(done)
+    result, rows = run("NonConforming", "--lenient")
+    assert_succeeded(result)
     assert rows["x"][-1] == pytest.approx(cos(sqrt(40)))
     assert (rows["up"] == (rows["x"] > 0)).all()
 
@@ -319,11 +321,11 @@ def test_descriptions_that_fmpy_cannot_read_are_read_with_lenient(run, external_
         return external_fmus.edited_copy(midpoint, tmp_path / name, edited_description(change))
 
     for old, new in UNREADABLE:
-        done, _ = run(str(edit("odd.fmu", [(old, new)])))
-        assert done.returncode == 1, new
+        result, _ = run(str(edit("odd.fmu", [(old, new)])))
+        assert result.returncode == 1, new
     edit("odd.fmu", UNREADABLE)
-    done, rows = run("odd.fmu", "--lenient", "--stop", "0.5", "--rtol", "1e-3")
-    assert_succeeded(done)
+    result, rows = run("odd.fmu", "--lenient", "--stop", "0.5", "--rtol", "1e-3")
+    assert_succeeded(result)
     assert {"x", "v"} <= {*rows}
     assert rows["x"][-1] == pytest.approx(cos(0.5 * sqrt(40)), abs=1e-3)
 
@@ -345,15 +347,15 @@ def test_descriptions_that_fmpy_cannot_read_are_read_with_lenient(run, external_
     ],
 )
 def test_an_unsupported_request_is_one_sentence(run, name, arguments, status, sentence):
-    done, _ = run(name, *arguments)
-    assert_refused(done, status, sentence)
+    result, _ = run(name, *arguments)
+    assert_refused(result, status, sentence)
 
 
 def test_a_scene_that_requests_invisible_steps_is_refused(external_fmu_folder, tmp_path):
     scene = SCENE.format(fmu=external_fmu_folder / "Midpoint.fmu", outputs=["x", "v"], more="analyses = ['steps']")
     (tmp_path / "mine.toml").write_text(scene)
-    done = commands.harness(tmp_path, "run", "mine.toml", COLUMNS="120")
-    assert_refused(done, 2, "Midpoint.fmu does not expose its solver steps")
+    result = commands.harness(tmp_path, "run", "mine.toml", COLUMNS="120")
+    assert_refused(result, 2, "Midpoint.fmu does not expose its solver steps")
 
 
 def edited_description(change):
@@ -415,9 +417,9 @@ def edited_description(change):
 )
 def test_a_damaged_file_is_one_sentence(run, external_fmu_folder, tmp_path, name, changes, sentence):
     external_fmus.edited_copy(external_fmu_folder / f"{name}.fmu", tmp_path / "damaged.fmu", changes)
-    done, _ = run("damaged.fmu")
-    assert done.returncode in (1, 2)
-    assert_refused(done, done.returncode, "damaged.fmu", sentence)
+    result, _ = run("damaged.fmu")
+    assert result.returncode in (1, 2)
+    assert_refused(result, result.returncode, "damaged.fmu", sentence)
 
 
 def repeat_variable(count, causality):
@@ -434,24 +436,24 @@ def test_an_fmu_with_many_variables_runs_or_is_refused(run, external_fmu_folder,
     """By default all outputs are recorded, but not the local variables of an FMU that has outputs."""
     changes = edited_description(repeat_variable(count, causality))
     external_fmus.edited_copy(external_fmu_folder / "FixedStep.fmu", tmp_path / "many.fmu", changes)
-    done, rows = run("many.fmu", "--lenient")
+    result, rows = run("many.fmu", "--lenient")
     if causality == "output":
-        assert_refused(done, 1, f"has {count + 1} outputs, more than the 1000 that are recorded by default")
+        assert_refused(result, 1, f"has {count + 1} outputs, more than the 1000 that are recorded by default")
         scene = 'title = "one of many"\nfmu = "many.fmu"\noutputs = ["x", "alias7"]\nlenient = true\nplots = []\n'
         (tmp_path / "mine.toml").write_text(scene)
         assert_succeeded(commands.harness(tmp_path, "run", "mine.toml"))
         rows = table(tmp_path / "results/mine/trajectory.csv")
         assert (rows["x"] == rows["alias7"]).all()
     else:
-        assert_succeeded(done)
+        assert_succeeded(result)
         assert set(rows) == {"t [s]", "x"}
 
 
 def test_an_array_that_is_too_large_is_refused_before_its_elements_are_named(run, external_fmu_folder, tmp_path):
     huge = edited_description(lambda text: text.replace('start="2"', 'start="1000000000"', 1))
     external_fmus.edited_copy(external_fmu_folder / "Arrays.fmu", tmp_path / "huge.fmu", huge)
-    done, _ = run("huge.fmu")
-    assert_refused(done, 1, "outputs, more than the 1000 that are recorded by default")
+    result, _ = run("huge.fmu")
+    assert_refused(result, 1, "outputs, more than the 1000 that are recorded by default")
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
@@ -459,8 +461,8 @@ def test_a_second_model_description_is_refused(run, external_fmu_folder, tmp_pat
     fmu = external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "two.fmu", {})
     with ZipFile(fmu, "a") as archive:
         archive.writestr("modelDescription.xml", archive.read("modelDescription.xml").replace(b'"x"', b'"y"'))
-    done, _ = run("two.fmu")
-    assert_refused(done, 1, "two.fmu cannot be read: it holds modelDescription.xml 2 times")
+    result, _ = run("two.fmu")
+    assert_refused(result, 1, "two.fmu cannot be read: it holds modelDescription.xml 2 times")
 
 
 def test_a_changed_file_is_read_again(external_fmu_folder, tmp_path):
@@ -479,9 +481,9 @@ def test_unicode_names_and_missing_units_are_supported(run, external_fmu_folder,
         tmp_path / "\u03c9.fmu",
         edited_description(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
     )
-    done, _ = run("\u03c9.fmu", "--rtol", "1e-3")
-    assert_succeeded(done)
-    assert re.search("^\u03c6, \u3042 +1 +0.99", done.stdout, re.M)
+    result, _ = run("\u03c9.fmu", "--rtol", "1e-3")
+    assert_succeeded(result)
+    assert re.search("^\u03c6, \u3042 +1 +0.99", result.stdout, re.M)
 
 
 def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folder, tmp_path):
@@ -490,8 +492,8 @@ def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folde
     ) as archive:
         archive.writestr("resources/huge", b"")
         archive.infolist()[-1].file_size = 2**60
-    done, _ = run("huge.fmu")
-    assert_refused(done, 1, "huge.fmu", "do not fit into the temporary directory")
+    result, _ = run("huge.fmu")
+    assert_refused(result, 1, "huge.fmu", "do not fit into the temporary directory")
 
 
 WITHOUT_DECLARED_STEP = SimpleNamespace(
@@ -532,11 +534,11 @@ def test_the_achieved_error_is_stated_and_refinement_ends_when_it_cannot_help(or
         return (8.0 * h) ** order + floor * sin(17.0 * i)
 
     answer, steps = refine_synthetic(lambda i, h: 1.0 + error(i, h))
-    achieved = abs(error(len(steps), steps[-1]))
-    stated = float(re.search(r"(?:error about|by more than) ([0-9.e-]+)", answer.note)[1])
+    achieved_error = abs(error(len(steps), steps[-1]))
+    stated_error = float(re.search(r"(?:error about|by more than) ([0-9.e-]+)", answer.note)[1])
     assert answer.failure == ""
-    assert achieved <= 2.0 * stated
-    assert stated <= max(1.1 * 2.0**order * achieved, 3.0 * floor)
+    assert achieved_error <= 2.0 * stated_error
+    assert stated_error <= max(1.1 * 2.0**order * achieved_error, 3.0 * floor)
     assert round(1.0 / steps[-1]) <= 2**14
     if not floor:
         assert float(re.search(r"order ([0-9.]+)", answer.note)[1]) == pytest.approx(order, abs=0.1)
@@ -544,14 +546,14 @@ def test_the_achieved_error_is_stated_and_refinement_ends_when_it_cannot_help(or
 
 @pytest.mark.parametrize("kind", [float, int, bool])
 @pytest.mark.parametrize(
-    ("shift", "stated"),
+    ("shift", "stated_error"),
     [
         (lambda i, h: 1e-12 * (-1) ** i, 0.0),  # an event at a communication point, before it in every second run
         (lambda i, h: 0.0, 0.0),
         (lambda i, h: 3.5 * h, None),  # an event that is located with first order
     ],
 )
-def test_times_of_jumps_are_compared_and_not_the_values_between_them(kind, shift, stated):
+def test_times_of_jumps_are_compared_and_not_the_values_between_them(kind, shift, stated_error):
     """Outputs are 0.3 t, and one that jumps from 0 to 1 at t = 0.25 s, and by -1 at t = 0.75 s."""
 
     def run(h, tolerance):
@@ -566,7 +568,7 @@ def test_times_of_jumps_are_compared_and_not_the_values_between_them(kind, shift
     runs = []
     answer = refine(RunSpec(Path("any.fmu"), start=0.0, stop=1.0, tolerance=1e-5), WITHOUT_DECLARED_STEP, run)
     assert answer.failure == ""
-    if stated is None:
+    if stated_error is None:
         assert 0.35e-5 <= runs[-1] <= 2e-5
         assert re.search(r"changes no output by more than ([0-9.e-]+), order 1\.0", answer.note)
     else:
@@ -606,12 +608,12 @@ INTEGERS = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UIn
 
 
 def test_an_array_has_the_size_of_its_structural_parameters(run, typed_fmu, tmp_path):
-    done, _ = run(str(typed_fmu), "--stop", "0.1")
-    assert_succeeded(done)
+    result, _ = run(str(typed_fmu), "--stop", "0.1")
+    assert_succeeded(result)
     columns = load_result(tmp_path / "results/Typed").columns
     assert [name for name in columns if "place" in name] == ["place[1]", "place[2]"]
-    done, _ = run(str(typed_fmu), "--set", "n=-1")
-    assert_refused(done, 2, "n = -1 is outside its range; allowed: any whole number")
+    result, _ = run(str(typed_fmu), "--set", "n=-1")
+    assert_refused(result, 2, "n = -1 is outside its range; allowed: any whole number")
 
 
 def test_integers_of_any_width_are_exact_and_refused_beyond_their_range(run, typed_fmu):
@@ -619,11 +621,13 @@ def test_integers_of_any_width_are_exact_and_refused_beyond_their_range(run, typ
     valid = []
     for kind in INTEGERS:
         width = int(kind.lstrip("UInt"))
-        least, most = (0, 2**width - 1) if kind[0] == "U" else (-(2 ** (width - 1)), 2 ** (width - 1) - 1)
-        for value in (least - 1, most + 1):
-            done, _ = run(str(typed_fmu), "--set", f"{kind}={value}")
-            assert_refused(done, 2, f"{kind} = {value} is ", f"any whole number, at least {least} and at most {most}")
-        valid += ["--set", f"{kind}={most}"]
-    done, _ = run(str(typed_fmu), *valid)
-    assert done.returncode == 1
-    assert "whole number" not in done.stderr
+        smallest, largest = (0, 2**width - 1) if kind[0] == "U" else (-(2 ** (width - 1)), 2 ** (width - 1) - 1)
+        for value in (smallest - 1, largest + 1):
+            result, _ = run(str(typed_fmu), "--set", f"{kind}={value}")
+            assert_refused(
+                result, 2, f"{kind} = {value} is ", f"any whole number, at least {smallest} and at most {largest}"
+            )
+        valid += ["--set", f"{kind}={largest}"]
+    result, _ = run(str(typed_fmu), *valid)
+    assert result.returncode == 1
+    assert "whole number" not in result.stderr

@@ -13,16 +13,16 @@ from harness.scenes.run_spec import RunSpec
 from harness.simulation.external.step_refinement import RefinementRun, refine
 
 EARLY, ENDS, NO_TEXT, BAD_TEXT = 1, 2, 3, 4  # faults of Ticking
-TERMINATES, UNSETTLED, NEXT_EVENT, IMMEDIATE, LOGS = 1, 2, 3, 4, 5  # faults of Bouncing
+TERMINATES, ENDLESS_ITERATION, NEXT_EVENT, IMMEDIATE, LOGS = 1, 2, 3, 4, 5  # faults of Bouncing
 
 
 def run_faulty(folder, name, fault, value=0.0, *options, fmu=None):
     """Run an FMU with a fault; return the error message and what was recorded until then."""
     fmu = fmu or build_external_fmus() / f"{name}.fmu"
     settings = "--set", f"fault={fault}", "--set", f"value={value!r}"
-    done = commands.harness(folder, "run", fmu, *settings, *options)
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    return done.stderr, harness.load_result(folder / "results" / name)
+    result = commands.harness(folder, "run", fmu, *settings, *options)
+    assert (result.returncode, result.stderr.count("\n")) == (1, 1)
+    return result.stderr, harness.load_result(folder / "results" / name)
 
 
 def test_an_unauthorised_early_return_is_refused(tmp_path):
@@ -60,7 +60,7 @@ def test_an_immediate_event_is_handled_at_once_and_not_forever(tmp_path):
     fmu = build_external_fmus() / "Bouncing.fmu"
     plain, immediate = (harness.simulate(fmu, {"fault": fault}) for fault in (0, IMMEDIATE))
     assert plain["h"].tolist() == immediate["h"].tolist()
-    message, _ = run_faulty(tmp_path, "Bouncing", UNSETTLED)
+    message, _ = run_faulty(tmp_path, "Bouncing", ENDLESS_ITERATION)
     assert "its discrete states do not settle at t = 0.4515" in message
 
 
@@ -77,14 +77,16 @@ def test_a_later_warning_does_not_hide_an_error(tmp_path):
     assert "its rubber is torn" in message
 
 
-@pytest.mark.parametrize("declared", ["0", "-1", "inf", "a tenth"])
-def test_an_impossible_step_size_is_treated_as_undeclared(declared):
+@pytest.mark.parametrize("declared_step", ["0", "-1", "inf", "a tenth"])
+def test_an_impossible_step_size_is_treated_as_undeclared(declared_step):
     steps = []
 
     def run(h, tolerance):
         steps.append(h)
         return RefinementRun(len(steps), np.zeros(1), {}, "no")
 
-    description = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
+    description = SimpleNamespace(
+        coSimulation=SimpleNamespace(fixedInternalStepSize=declared_step), defaultExperiment=None
+    )
     refine(RunSpec(Path("any.fmu"), start=0.0, stop=1.0), description, run)
     assert min(steps) > 0.0

@@ -34,8 +34,8 @@ def odd_folder(tmp_path, fmus):
 def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd_folder, command):
     temporary = odd_folder / "temporary"
     temporary.mkdir()
-    done = run_process(odd_folder, *command, "--out", odd_folder / "out", TMPDIR=str(temporary))
-    assert (done.returncode, done.stderr) == (0, "")
+    result = run_process(odd_folder, *command, "--out", odd_folder / "out", TMPDIR=str(temporary))
+    assert (result.returncode, result.stderr) == (0, "")
     assert list(temporary.iterdir()) == []
     assert any((odd_folder / "out").rglob("*.svg")) or any((odd_folder / "out").rglob("*.csv"))
 
@@ -51,12 +51,12 @@ def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd_folde
 
 @pytest.mark.parametrize("part", ["resources/", "resources/slavemodule.txt", "_fmu.py"])
 def test_a_python_fmu_without_the_files_of_its_library_is_refused(fmus, tmp_path, part):
-    broken = copy_without(fmus / "smd.fmu", tmp_path / "broken.fmu", lambda name: part in name)
-    done = harness(tmp_path, "run", broken)
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert done.stderr.startswith("Error: ")
-    assert "broken.fmu lacks resources/" in done.stderr
+    broken_fmu = copy_without(fmus / "smd.fmu", tmp_path / "broken.fmu", lambda name: part in name)
+    result = harness(tmp_path, "run", broken_fmu)
+    assert result.returncode == 1
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("Error: ")
+    assert "broken.fmu lacks resources/" in result.stderr
 
 
 def test_an_unwritable_temporary_folder_is_reported(fmus, tmp_path, monkeypatch):

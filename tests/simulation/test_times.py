@@ -91,13 +91,13 @@ def test_a_ramp_of_an_input_follows_its_rows(fmus, tmp_path):
     rows, options = np.linspace(0.0, 2.0, 2001), {"stop": 2.0, "follow": False}
     inputs = {"time": rows, "F_ext": np.sin(rows)}
     smd, times = fmus / "smd.fmu", [0.5, 2.0]
-    driven = harness.simulate(write_scene(tmp_path, smd, **options, times=times), inputs=inputs)
+    driven_run = harness.simulate(write_scene(tmp_path, smd, **options, times=times), inputs=inputs)
     scene = write_scene(tmp_path, smd, **options, times=times, grid=0.001)
     grid = harness.simulate(scene, inputs={"time": rows[::200], "F_ext": np.sin(rows[::200])})
-    assert len(driven.time) == len(grid.time) == 2
-    assert np.abs(driven["x"] - grid["x"]).max() < 2e-3 * np.abs(driven["x"]).max()
+    assert len(driven_run.time) == len(grid.time) == 2
+    assert np.abs(driven_run["x"] - grid["x"]).max() < 2e-3 * np.abs(driven_run["x"]).max()
     full = harness.simulate(write_scene(tmp_path, smd, **options, grid=0.001), inputs=inputs)
-    assert np.abs(driven["x"] - full["x"][[500, -1]]).max() < 1e-12
+    assert np.abs(driven_run["x"] - full["x"][[500, -1]]).max() < 1e-12
 
 
 def test_an_aborted_run_keeps_the_times_that_it_reached(tmp_path):
@@ -105,20 +105,20 @@ def test_an_aborted_run_keeps_the_times_that_it_reached(tmp_path):
     for times in ([0.1, 0.2, 0.9], [0.8, 0.9]):
         faulty = build_external_fmus() / "Faulty.fmu"
         write_scene(tmp_path, faulty, times=times, stop=1.0, values="{kind = 2}")
-        done = commands.harness(tmp_path, "run", "scene.toml")
-        assert done.returncode == 1
-        assert "crashed" in done.stderr
-        reached = harness.load_result(tmp_path / "results/scene").time
+        result = commands.harness(tmp_path, "run", "scene.toml")
+        assert result.returncode == 1
+        assert "crashed" in result.stderr
+        reached_times = harness.load_result(tmp_path / "results/scene").time
         if times[0] == 0.1:
-            assert reached.tolist() == [0.1, 0.2]
+            assert reached_times.tolist() == [0.1, 0.2]
         else:
-            assert 0.4 < reached.item() < 0.8
+            assert 0.4 < reached_times.item() < 0.8
 
 
 def test_a_scene_is_recorded_at_times(workspace):
     scene = 'title = "some times"\nmodel = "stickslip"\noutputs = ["x", "v"]\ntimes = [0.0, 0.5, 4.5, 6.25, 15.0]\n'
     (workspace / "some.toml").write_text(scene)
-    done = commands.harness(workspace, "run", "some.toml")
-    assert done.returncode == 0, done.stderr
+    result = commands.harness(workspace, "run", "some.toml")
+    assert result.returncode == 0, result.stderr
     table = np.loadtxt(workspace / "results/some/trajectory.csv", delimiter=",", skiprows=1)
     assert table[:, 0].tolist() == [0.0, 0.5, 4.5, 6.25, 15.0]

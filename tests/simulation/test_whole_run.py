@@ -32,8 +32,8 @@ def sled(request, fmus):
 @pytest.fixture
 def simulator(sled):
     """Runs of the FMU with the output x, at 401 times."""
-    with open_simulator(RunSpec(sled, ("x",), times=T, follow=False)) as opened:
-        yield opened
+    with open_simulator(RunSpec(sled, ("x",), times=T, follow=False)) as opened_simulator:
+        yield opened_simulator
 
 
 def run_each_way(simulator, spec, values):
@@ -41,13 +41,13 @@ def run_each_way(simulator, spec, values):
 
     In a child process, both are the compiled loop.
     """
-    compiled = simulator.prepare(spec)(values)
+    compiled_outputs = simulator.prepare(spec)(values)
     loop = getattr(simulator, "loop", None)
     simulator.loop = None
-    stepped = simulator.prepare(spec)(values)
+    python_outputs = simulator.prepare(spec)(values)
     simulator.loop = loop
-    assert (compiled is None and stepped is None) or np.array_equal(compiled, stepped)
-    return compiled
+    assert (compiled_outputs is None and python_outputs is None) or np.array_equal(compiled_outputs, python_outputs)
+    return compiled_outputs
 
 
 UNEVEN = np.sort(np.random.default_rng(1).uniform(0.5, 7.5, 60))
@@ -66,11 +66,11 @@ RUNS = {
 }
 
 
-@pytest.mark.parametrize("described", RUNS.values(), ids=RUNS)
-def test_a_whole_run_is_that_of_simulate(sled, fmus, described):
-    if "inputs" in described and interpolates_inputs(sled):
+@pytest.mark.parametrize("options", RUNS.values(), ids=RUNS)
+def test_a_whole_run_is_that_of_simulate(sled, fmus, options):
+    if "inputs" in options and interpolates_inputs(sled):
         pytest.skip("its inputs are linear in each step, and constant in the steps of `simulate`")
-    spec = RunSpec(sled, ("x", "F_spring"), follow=False, **described)
+    spec = RunSpec(sled, ("x", "F_spring"), follow=False, **options)
     expected = run_spec(replace(spec, fmu=fmus / "stickslip.fmu", values={"mu_s": 0.8}))
     with open_simulator(spec) as simulator:
         y = run_each_way(simulator, spec, {"mu_s": 0.8})
@@ -108,10 +108,10 @@ def test_other_inputs_are_their_mean_over_a_step(simulator, sled):
     if interpolates_inputs(sled):
         pytest.skip("its inputs are linear in each step")
     force = 60.0 * np.sin(2.0 * T)
-    driven = simulator.prepare(replace(simulator.spec, inputs={"time": T, "F_ext": force}))({})
+    driven_outputs = simulator.prepare(replace(simulator.spec, inputs={"time": T, "F_ext": force}))({})
     times, means = np.repeat(T, 2)[1:-1], np.repeat(0.5 * (force[1:] + force[:-1]), 2)
     constant = simulator.prepare(replace(simulator.spec, inputs={"time": times, "F_ext": means}))({})
-    assert np.abs(driven - constant).max() < 1e-12 * np.abs(driven).max()
+    assert np.abs(driven_outputs - constant).max() < 1e-12 * np.abs(driven_outputs).max()
 
 
 def test_prepared_runs_do_not_mix(simulator):
@@ -121,10 +121,10 @@ def test_prepared_runs_do_not_mix(simulator):
     runs = [simulator.prepare(replace(simulator.spec, inputs=table)) for table in inputs]
     other = simulator.prepare(simulator.spec)
     for _ in range(2):
-        driven = [run({"k": 60.0}) for run in runs]
+        driven_outputs = [run({"k": 60.0}) for run in runs]
         constant = [other({"k": 60.0, "F_ext": force}) for force in forces]
-        assert np.abs(np.array(driven) - constant).max() < 1e-12
-        assert np.ptp([x[-1] for x in driven]) > 0
+        assert np.abs(np.array(driven_outputs) - constant).max() < 1e-12
+        assert np.ptp([x[-1] for x in driven_outputs]) > 0
         assert not np.array_equal(other({"k": 900.0, "F_ext": forces[-1]}), constant[-1])
         assert not np.array_equal(other({"F_ext": forces[-1]}), constant[-1])
 
@@ -179,8 +179,8 @@ simulator.close()
 
 def test_the_loop_in_python_refuses_outputs_that_are_not_finite(tmp_path):
     """A process of its own loads the FMU, whose pythonfmu would replace the installed one for later tests."""
-    done = commands.run_python(tmp_path, "-c", PYTHON_LOOP, build_external_fmus() / "Faulty.fmu")
-    assert (done.stdout, done.stderr) == ("False True\n", "")
+    result = commands.run_python(tmp_path, "-c", PYTHON_LOOP, build_external_fmus() / "Faulty.fmu")
+    assert (result.stdout, result.stderr) == ("False True\n", "")
 
 
 def test_an_external_fmu_that_crashes_is_replaced():
@@ -216,6 +216,6 @@ def test_a_native_fmu_is_built_from_the_model_file(fmus, tmp_path):
     native = native_equivalent(python)
     assert native not in (python, fmus / "smd.fmu")
     run = RunSpec(python, ("x",), times=T, follow=False)
-    with open_simulator(run) as one, open_simulator(replace(run, fmu=native)) as other:
-        runs = [opened.prepare(opened.spec)({"m": 2.0}) for opened in (one, other)]
+    with open_simulator(run) as python_simulator, open_simulator(replace(run, fmu=native)) as native_simulator:
+        runs = [simulator.prepare(simulator.spec)({"m": 2.0}) for simulator in (python_simulator, native_simulator)]
     assert np.array_equal(*runs)
