@@ -104,24 +104,24 @@ def full_model_text(name):
 
 
 @pytest.fixture
-def built(tmp_path):
-    """Return built(name, kind), the path of an FMU, which is built once per test run."""
+def build_fmu(tmp_path):
+    """Return build_fmu(name, kind), the path of an FMU, which is built once per test run."""
 
-    def built(name, kind=""):
+    def build_fmu(name, kind=""):
         (tmp_path / f"{name}.py").write_text(model_text(name))
         return build_user_model(tmp_path / f"{name}.py", *KINDS[kind], *LABELS) / kind / f"{name}.fmu"
 
-    return built
+    return build_fmu
 
 
 @pytest.fixture
-def launch(worker, built):
+def launch(worker, build_fmu):
     """Return launch(name, kind, values), an initialized instance."""
     instances = []
 
     def launch(name, kind="", **values):
         settings = {f"solver.{word}": values.pop(word) for word in ("method", "rtol", "h_max") if word in values}
-        instances.append(worker.instantiate(built(name, kind)).begin(values | settings, stop=STOP))
+        instances.append(worker.instantiate(build_fmu(name, kind)).begin(values | settings, stop=STOP))
         return instances[-1]
 
     yield launch
@@ -177,8 +177,8 @@ def piecewise_solution(name):
         if run.status == 0:
             return y, changes
         changes += 1
-        (changed,) = [i for i, times in enumerate(run.t_events) if len(times)]
-        sides[changed] = not sides[changed]
+        (index,) = [i for i, times in enumerate(run.t_events) if len(times)]
+        sides[index] = not sides[index]
 
 
 @pytest.mark.parametrize(
@@ -317,13 +317,13 @@ def test_results_do_not_depend_on_backend_and_communication_steps(launch, name):
             ahead = fmu.get("solver.t_next")
             for end in (0.5 * (t + ahead), ahead):
                 fmu.step(t, end - t)
-                t, saved = end, fmu.save()
+                t, state = end, fmu.save()
                 fmu.step(t, 1.0)
                 first = fmu.get(*names)
-                fmu.restore(saved)
+                fmu.restore(state)
                 fmu.step(t, 1.0)
                 assert fmu.get(*names) == first
-                fmu.restore(saved)
+                fmu.restore(state)
 
 
 @pytest.mark.slow
@@ -459,9 +459,9 @@ def test_a_limit_that_falls_to_zero_for_a_short_time_lets_go(launch):
         for Omega in (5.0, 9.0):
             fmu = launch("guided", method=method, x0=0.005, Omega=Omega)
             x, mode = np.array(fmu.run(times.tolist(), ["x", "mode"])).T
-            stuck = mode == 0
-            assert np.count_nonzero(stuck) > 500
-            assert np.all(K * np.abs(x[stuck]) <= 2.0 * MU * F * np.abs(np.sin(Omega * times[stuck])) + 1e-9)
+            is_stuck = mode == 0
+            assert np.count_nonzero(is_stuck) > 500
+            assert np.all(K * np.abs(x[is_stuck]) <= 2.0 * MU * F * np.abs(np.sin(Omega * times[is_stuck])) + 1e-9)
 
 
 def test_a_cusp_of_the_load_breaks_a_contact_away(launch):
@@ -537,12 +537,12 @@ def test_the_indicator_of_a_condition_has_its_unit(tmp_path, condition, unit):
 @pytest.mark.parametrize(
     ("name", "kind"), [("relay", "native"), ("backlash", "native"), ("backlash", "native/fmi3"), ("timed", "native")]
 )
-def test_the_solver_of_an_importer_locates_the_changes(worker, built, name, kind):
+def test_the_solver_of_an_importer_locates_the_changes(worker, build_fmu, name, kind):
     """CVode; its error is about a hundred tolerances."""
-    fmu, conditions = built(name, kind), len(PIECES[name][0])
-    described = read_model_description(fmu)
-    assert described.numberOfEventIndicators == conditions
-    indicators = [v.name for v in described.modelVariables if v.name.startswith("events.condition_")]
+    fmu, conditions = build_fmu(name, kind), len(PIECES[name][0])
+    description = read_model_description(fmu)
+    assert description.numberOfEventIndicators == conditions
+    indicators = [v.name for v in description.modelVariables if v.name.startswith("events.condition_")]
     assert indicators == [f"events.condition_{i + 1}" for i in range(conditions)]
     (x, _), _ = piecewise_solution(name)
     for rtol in (1e-6, 1e-9):
@@ -552,7 +552,7 @@ def test_the_solver_of_an_importer_locates_the_changes(worker, built, name, kind
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("kind", ["native", pytest.param("native/fmi3", marks=pytest.mark.campaign)])
-def test_model_exchange_refuses_what_co_simulation_refuses(worker, built, kind):
+def test_model_exchange_refuses_what_co_simulation_refuses(worker, build_fmu, kind):
     """Chattering, negative sliding forces, and sliding forces above the holding force at rest."""
     for name, x0, text in (
         ("chattering", 0.2, "a condition of choose() changes again and again at t = 0.62831"),
@@ -560,7 +560,7 @@ def test_model_exchange_refuses_what_co_simulation_refuses(worker, built, kind):
         ("holdingspeed", 0.14, "F_f: the sliding force exceeds the holding force at t = 0.31415"),
     ):
         with pytest.raises(FmpyError, match="failed with status 3"):
-            exchange(worker, built(name, kind), 1e-6, x0)
+            exchange(worker, build_fmu(name, kind), 1e-6, x0)
         assert text in worker.read_stderr()
 
 

@@ -27,11 +27,11 @@ from fmus.compiler.model_lookup import find_model
 
 SOURCES = [*MODELS, *EXAMPLE_MODELS]
 EVERY_SOURCE = pytest.mark.parametrize("source", SOURCES, ids=lambda source: getattr(source, "stem", source))
-COMPARED = {"<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b}
+COMPARISONS = {"<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b}
 DIGITS = 50
 
 
-class Evaluated:
+class EquationEvaluator:
     """The declared equations of a model, evaluated directly, term by term, in floats or in many digits."""
 
     def __init__(self, analysis, values, functions):
@@ -43,16 +43,16 @@ class Evaluated:
         if not isinstance(e, Term):
             return self.values[e.name] if isinstance(e, Variable) else self.number(e)
         if e.op == "choose":
-            test, this, that = e.args
-            return self.of(this if self.holds(test) else that)
-        args = [self.of(one) for one in e.args]
+            test, value, other_value = e.args
+            return self.of(value if self.holds(test) else other_value)
+        args = [self.of(arg) for arg in e.args]
         if e.op in ARITHMETIC:
             return ARITHMETIC[e.op](*args)
         return -args[0] if e.op == "neg" else getattr(self.functions, e.op)(*args)
 
     def holds(self, test):
         a, b = test.args
-        return self.values[a.name] == b if test.op == "==" else COMPARED[test.op](self.of(a), self.of(b))
+        return self.values[a.name] == b if test.op == "==" else COMPARISONS[test.op](self.of(a), self.of(b))
 
     def number(self, x):
         return mpmath.mpf(x) if self.functions is mpmath.mp else float(x)
@@ -96,7 +96,7 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
     n_tried = 0
     for values, t, at, mode in situations(analysis, model, 300):
         values |= at | driver_positions(analysis, model, t) | dict.fromkeys(modes, mode)
-        equations = Evaluated(analysis, values, math)
+        equations = EquationEvaluator(analysis, values, math)
         for c in analysis.contacts:
             values[c.name] = mode * equations.of(c.slide)
         model.compute_outputs(t, *at.values(), *[mode] * len(modes))
@@ -122,8 +122,8 @@ def test_the_rounding_scale_of_loads_and_rates_bounds_them_and_their_rounding_er
     analysis, model = find_model(source).analysis, scalar_class(source)()
     for values, t, at, mode in situations(analysis, model, 60):
         values |= at | driver_positions(analysis, model, t) | {m.name: mode for m in analysis.modes}
-        values |= {c.name: mode * Evaluated(analysis, values, math).of(c.slide) for c in analysis.contacts}
-        floats, exact = Evaluated(analysis, values, math), Evaluated(analysis, values, mpmath.mp)
+        values |= {c.name: mode * EquationEvaluator(analysis, values, math).of(c.slide) for c in analysis.contacts}
+        floats, exact = EquationEvaluator(analysis, values, math), EquationEvaluator(analysis, values, mpmath.mp)
         for e in (*analysis.load.values(), *analysis.rate_outputs.values()):
             scale = floats.of(rounding_scale(e))
             assert abs(floats.of(e)) <= scale * (1.0 + 1e-12)
@@ -132,10 +132,10 @@ def test_the_rounding_scale_of_loads_and_rates_bounds_them_and_their_rounding_er
                 assert abs(exact.of(e) - floats.of(e)) <= 16 * 2.0**-52 * scale
 
 
-GUIDED = """
+GUIDED_BODY = """
 from fmus import Choice, Model, Output, Parameter, State, cos
 
-class Guided(Model):
+class GuidedBody(Model):
     'A body pulled by a guide.'
 
     m = Parameter(2.0, "kg", "mass", above=0.0)
@@ -155,7 +155,7 @@ class Guided(Model):
 def test_magnitudes_of_rates_depend_on_a_choice_and_on_a_driver(tmp_path):
     """They have the driver's own magnitude, and its position where a function takes it."""
     file = tmp_path / "guided.py"
-    file.write_text(GUIDED)
+    file.write_text(GUIDED_BODY)
     analysis, model = find_model(file).analysis, scalar_class(file)()
     for values, t, at, _ in situations(analysis, model, 20):
         guide = driver_positions(analysis, model, t)["guide"]
@@ -197,15 +197,17 @@ def test_any_number_of_states_and_contacts_is_derived(source):
             situation |= {m.name: mode for m, mode in zip(analysis.modes, modes, strict=True)}
             point = t, *at.values(), *modes
             rates = model.rates(*point)
-            for state, got in zip(
+            for state, value in zip(
                 analysis.dynamic_states, rates if len(analysis.dynamic_states) > 1 else [rates], strict=True
             ):
                 true = converged_law(analysis, analysis.rate_outputs[state], situation)
-                assert abs(got - true) < 1e-12 * (1 + abs(true))
-                stuck = [c for c in analysis.independent_contacts if c.slip is state and situation[c.mode.name] == 0]
-                assert got == 0.0 or not stuck
-            for got, true in zip(model.jacobian(*point), slopes(analysis, situation), strict=True):
-                assert abs(got - true) < 1e-11 * (1 + abs(true))
+                assert abs(value - true) < 1e-12 * (1 + abs(true))
+                stuck_contacts = [
+                    c for c in analysis.independent_contacts if c.slip is state and situation[c.mode.name] == 0
+                ]
+                assert value == 0.0 or not stuck_contacts
+            for value, true in zip(model.jacobian(*point), slopes(analysis, situation), strict=True):
+                assert abs(value - true) < 1e-11 * (1 + abs(true))
 
 
 def slopes(analysis, values):
@@ -215,11 +217,11 @@ def slopes(analysis, values):
     with mpmath.workdps(DIGITS):
         h = mpmath.mpf(10) ** -20
 
-        def moved(direction, step):
+        def shift_values(direction, step):
             return values | {name: values[name] + step * mpmath.mpf(speed) for name, speed in direction.items()}
 
         pairs = (
-            [converged_law(analysis, analysis.rate_outputs[s], moved(direction, d)) for d in (h, -h)]
+            [converged_law(analysis, analysis.rate_outputs[s], shift_values(direction, d)) for d in (h, -h)]
             for s in analysis.dynamic_states
             for direction in directions
         )
@@ -235,8 +237,8 @@ def converged_law(analysis, law, variables):
     """
     modes = {m.name for m in analysis.modes}
     values = {name: value if name in modes else mpmath.mpf(value) for name, value in variables.items()}
-    equations = Evaluated(analysis, values, mpmath.mp)
-    stuck = [c for c in analysis.contacts if values[c.mode.name] == 0]
+    equations = EquationEvaluator(analysis, values, mpmath.mp)
+    stuck_contacts = [c for c in analysis.contacts if values[c.mode.name] == 0]
     for c in analysis.contacts:
         values[c.name] = values[c.mode.name] * equations.of(c.slide) + mpmath.mpf(0)
 
@@ -244,17 +246,19 @@ def converged_law(analysis, law, variables):
         h = mpmath.mpf(10) ** -15
         flow = {s.name: h * equations.of(analysis.rate[s]) for s in analysis.states}
         flow |= {d.name: h * values[d.constant_rate.name] for d in analysis.drivers}
-        later = Evaluated(analysis, values | {name: values[name] + rate for name, rate in flow.items()}, mpmath.mp)
-        return [(later.of(c.slip) - equations.of(c.slip)) / h for c in stuck]
+        later = EquationEvaluator(
+            analysis, values | {name: values[name] + rate for name, rate in flow.items()}, mpmath.mp
+        )
+        return [(later.of(c.slip) - equations.of(c.slip)) / h for c in stuck_contacts]
 
-    if stuck:
+    if stuck_contacts:
         without, columns = rates(), []
-        for c in stuck:
+        for c in stuck_contacts:
             values[c.name] = mpmath.mpf(1)
             columns.append([b - a for a, b in zip(rates(), without, strict=True)])
             values[c.name] = mpmath.mpf(0)
         forces = mpmath.lu_solve(mpmath.matrix(columns).T, mpmath.matrix(without))
-        values |= {c.name: force for c, force in zip(stuck, forces, strict=True)}
+        values |= {c.name: force for c, force in zip(stuck_contacts, forces, strict=True)}
     return equations.of(law)
 
 
@@ -313,8 +317,8 @@ def test_subclassed_variable_types_behave_like_their_base(tmp_path):
     assert find_model(path).generated_source == find_model("smd").generated_source.replace("smd.py", "mine.py")
 
 
-@pytest.mark.parametrize("moved", ["x", "driver"])
-def test_a_discontinuous_law_has_no_closed_form_even_with_linear_slopes(tmp_path, moved):
+@pytest.mark.parametrize("moving_variable", ["x", "driver"])
+def test_a_discontinuous_law_has_no_closed_form_even_with_linear_slopes(tmp_path, moving_variable):
     """Where a condition moves, slopes determine neither the motion nor the load at rest."""
     text = f'''"""A model."""
 from fmus import Contact, Mode, Model, Output, Parameter, State, choose
@@ -333,13 +337,13 @@ class Jump(Model):
     driver = State("m", "driver", rate=u)
     mode = Mode()
     F = Contact("N", "friction", mode=mode, slip=v, slide=f)
-    a = Output("m/s2", "acceleration", (k * (driver - x) + choose({moved} > edge, f, -f) - F) / m, rate_of=v)
+    a = Output("m/s2", "acceleration", (k * (driver - x) + choose({moving_variable} > edge, f, -f) - F) / m, rate_of=v)
 '''
     (tmp_path / "jump.py").write_text(text)
     analysis = find_model(tmp_path / "jump.py").analysis
     assert analysis.closed_form is None
-    assert analysis.rests_when_stuck == (moved == "x")
-    (tmp_path / "jump.py").write_text(text.replace(f"choose({moved} > edge, f, -f)", "f"))
+    assert analysis.rests_when_stuck == (moving_variable == "x")
+    (tmp_path / "jump.py").write_text(text.replace(f"choose({moving_variable} > edge, f, -f)", "f"))
     assert find_model(tmp_path / "jump.py").analysis.closed_form is not None
 
 

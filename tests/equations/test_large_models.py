@@ -122,7 +122,7 @@ def test_equations_deeper_than_the_stack_of_python_build(tmp_path, shape):
     step, force, _ = SHAPES[shape]
     values = [0.1]
     names = {"values": values, "r": 0.1, "k": 100.0, "L": 1.0, "x": 0.1, "sin": math.sin}
-    names["choose"] = lambda condition, this, that: this
+    names["choose"] = lambda condition, value, other_value: value
     for i in range(n):
         values.append(eval(step, names | {"i": i}))
     assert model.rates(0.0, 0.1, 1.0, 1) == pytest.approx(eval(force, names) - 2.0, rel=1e-14)

@@ -96,10 +96,10 @@ def solve(P_1, S):
         else:
             pull = -100.0 * y[0]
             times = np.linspace(t, STOP, 400_001)
-            released = np.flatnonzero(abs(pull) > np.maximum(0.8 * force(times), 0.0))
-            if len(released) == 0:
+            release_indices = np.flatnonzero(abs(pull) > np.maximum(0.8 * force(times), 0.0))
+            if len(release_indices) == 0:
                 return changes, y
-            low, high = times[released[0] - 1], times[released[0]]
+            low, high = times[release_indices[0] - 1], times[release_indices[0]]
             for _ in range(60):
                 middle = 0.5 * (low + high)
                 low, high = (low, middle) if abs(pull) > holds(middle) else (middle, high)

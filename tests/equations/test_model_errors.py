@@ -31,9 +31,9 @@ RATE = '    a = Output("m/s2", "acceleration", (F - k * x) / m, rate_of=v)\n'
 USE = '    power = Output("W", "power of the belt", f * u)\n'  # uses what the equation of motion does not
 DRY = '    mode = Mode()\n    R = Contact("N", "friction", mode=mode, slip=v, slide=f)\n'
 PLANAR = '    mode = Mode()\n    R = PlanarContact("N", "friction", mode=mode, slip=(v, u), slide=f)\n'
-STUCK = '    a = Output("m/s2", "acceleration", (F - k * x - R) / m, rate_of=v)\n'
+RATE_WITH_FRICTION = '    a = Output("m/s2", "acceleration", (F - k * x - R) / m, rate_of=v)\n'
 
-RESERVED = ("solver", "rates", "double", "t", "NULL", "INT64_MAX", "M_E", "fmi2True", "sqrt", "stop_time", "time")
+RESERVED_NAMES = ("solver", "rates", "double", "t", "NULL", "INT64_MAX", "M_E", "fmi2True", "sqrt", "stop_time", "time")
 
 # The text after the head (15 lines), the reported line, and the message.
 WRONG = {
@@ -99,12 +99,12 @@ WRONG = {
     ),
     "a law without friction": (DRY + RATE, 17, "R does not act on its own slip, so it can never stick"),
     "a squared force": (
-        DRY + STUCK.replace("- R)", "- R * R / f)"),
+        DRY + RATE_WITH_FRICTION.replace("- R)", "- R * R / f)"),
         17,
         "R must enter the rate of the slip of R linearly",
     ),
     "a force in a function": (
-        DRY + STUCK.replace("- R)", "- f * sin(R / f))"),
+        DRY + RATE_WITH_FRICTION.replace("- R)", "- f * sin(R / f))"),
         17,
         "R must enter the rate of the slip of R linearly",
     ),
@@ -114,32 +114,32 @@ WRONG = {
         "mode is the mode of 0 contacts: each Mode needs exactly one Contact",
     ),
     "a law instead of the hybrid one": (
-        DRY.replace("slide=f", "slide=f, laws=(SIGN,)") + STUCK,
+        DRY.replace("slide=f", "slide=f, laws=(SIGN,)") + RATE_WITH_FRICTION,
         17,
         "laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got ('sign',)",
     ),
     "the hybrid law after another one": (
-        DRY.replace("slide=f", "slide=f, laws=(SIGN, HYBRID)") + STUCK,
+        DRY.replace("slide=f", "slide=f, laws=(SIGN, HYBRID)") + RATE_WITH_FRICTION,
         17,
         "laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got ('sign', 'hybrid')",
     ),
     "three laws": (
-        DRY.replace("slide=f", "slide=f, laws=(HYBRID, SIGN, THRESHOLD), eps=f") + STUCK,
+        DRY.replace("slide=f", "slide=f, laws=(HYBRID, SIGN, THRESHOLD), eps=f") + RATE_WITH_FRICTION,
         17,
         "laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got ('hybrid', 'sign', 'threshold')",
     ),
     "a threshold without eps": (
-        DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD)") + STUCK,
+        DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD)") + RATE_WITH_FRICTION,
         17,
         "eps is required with the law THRESHOLD and not allowed without it",
     ),
     "a slide of another unit": (
-        DRY.replace("slide=f", "slide=k") + STUCK,
+        DRY.replace("slide=f", "slide=k") + RATE_WITH_FRICTION,
         17,
         "R is declared in N, but slide k is in kg/s^2",
     ),
     "a threshold of another unit": (
-        DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD), eps=f") + STUCK,
+        DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD), eps=f") + RATE_WITH_FRICTION,
         17,
         "the slip of R is in m/s, but eps f is in kg m/s^2",
     ),
@@ -212,13 +212,13 @@ WRONG = {
         "d / d cannot be calculated at the start values, where d is 0.0",
     ),
     "a squared force in another rate": (
-        DRY + STUCK + '    w = State("m/s", "another speed")\n'
+        DRY + RATE_WITH_FRICTION + '    w = State("m/s", "another speed")\n'
         '    b = Output("m/s2", "acceleration", R * R / (f * m), rate_of=w)\n',
         20,
         "R must enter b linearly",
     ),
     "a force that drives": (
-        DRY + STUCK.replace("- R)", "+ R)"),
+        DRY + RATE_WITH_FRICTION.replace("- R)", "+ R)"),
         17,
         "R accelerates its own slip instead of opposing it: change its sign in the rates",
     ),
@@ -247,14 +247,14 @@ WRONG = {
         "T and R and S and U hold the same motion at rest, so their forces are not determined: put a spring",
     ),
     "a slip that is not linear": (
-        DRY.replace("slip=v", "slip=v * fabs(v)") + STUCK,
+        DRY.replace("slip=v", "slip=v * fabs(v)") + RATE_WITH_FRICTION,
         17,
         "slip of R must be linear in the speeds on which it acts",
     ),
     "contacts of several laws": (
         DRY + '    other = Mode()\n    w = State("m/s", "another speed")\n'
         '    S = Contact("N", "friction", mode=other, slip=w, slide=f, laws=(HYBRID, SIGN))\n'
-        + STUCK
+        + RATE_WITH_FRICTION
         + "    b = Output('m/s2', 'acceleration', -S / m, rate_of=w)\n",
         20,
         "S and R have different laws: give all contacts the same laws",
@@ -300,27 +300,28 @@ WRONG = {
         "== and != cannot compare expressions",
     ),
     "friction that drives": (
-        DRY.replace("slide=f", "slide=-f") + STUCK,
+        DRY.replace("slide=f", "slide=-f") + RATE_WITH_FRICTION,
         17,
         "slide or hold of R is negative at the start values",
     ),
     "friction that grows with the slip, not its size": (
-        DRY.replace("slide=f", "slide=f + f * v / u") + STUCK,
+        DRY.replace("slide=f", "slide=f + f * v / u") + RATE_WITH_FRICTION,
         17,
         "slide of R is 2 N at a slip of 1, but 0 N at -1: write the size of the slip by fabs()",
     ),
     "friction that grows with the slip on a belt": (
-        DRY.replace("slip=v, slide=f", "slip=v - u, slide=f * (3.0 + (v - u) / u), lifts_off=True") + STUCK,
+        DRY.replace("slip=v, slide=f", "slip=v - u, slide=f * (3.0 + (v - u) / u), lifts_off=True")
+        + RATE_WITH_FRICTION,
         17,
         "slide of R is 4 N at a slip of 1, but 2 N at -1: write the size of the slip by fabs()",
     ),
     "friction that decays with the slip, not its size": (
-        DRY.replace("slide=f", "slide=f * (1.0 + exp(-v / u))") + STUCK,
+        DRY.replace("slide=f", "slide=f * (1.0 + exp(-v / u))") + RATE_WITH_FRICTION,
         17,
         "slide of R is 1.36788 N at a slip of 1, but 3.71828 N at -1: write the size of the slip by fabs()",
     ),
     "other friction backward without a holding force": (
-        DRY.replace("slide=f", "slide=choose(v > 0.0, f, 2.0 * f)") + STUCK,
+        DRY.replace("slide=f", "slide=choose(v > 0.0, f, 2.0 * f)") + RATE_WITH_FRICTION,
         17,
         "slide of R is 1 N for small positive slips, but 2 N for negative ones: pass as slide the mean of",
     ),
@@ -443,7 +444,7 @@ WRONG = {
         "State has no argument finest, the nearest is nominal_velocity: write State(unit, text, start=",
     ),
     "a contact without slide": (
-        DRY.replace(", slide=f", "") + STUCK,
+        DRY.replace(", slide=f", "") + RATE_WITH_FRICTION,
         17,
         "Contact lacks the argument slide: write Contact(unit, text, mode, slip, slide, hold=",
     ),
@@ -454,17 +455,17 @@ WRONG = {
     ),
     "an argument that another function lacks": (RATE + "    q = abs()\n", 17, "TypeError: abs() takes exactly one"),
     "two modes": (
-        DRY.replace("mode=mode", "mode=(mode, mode)") + STUCK,
+        DRY.replace("mode=mode", "mode=(mode, mode)") + RATE_WITH_FRICTION,
         17,
         "mode of a Contact must be a Mode that is declared before it, got an object of type tuple",
     ),
     "a position as slip": (
-        DRY.replace("slip=v", "slip=x") + STUCK,
+        DRY.replace("slip=v", "slip=x") + RATE_WITH_FRICTION,
         17,
         "slip of R is x, but a slip is a speed: write slip=v",
     ),
     "a slip in quotes": (
-        DRY.replace("slip=v", 'slip="v"') + STUCK,
+        DRY.replace("slip=v", 'slip="v"') + RATE_WITH_FRICTION,
         17,
         "slip of a Contact must be an expression of st",
     ),
@@ -525,7 +526,7 @@ WRONG = {
     ),
     "a number for a name": (RATE + '    vars()[3] = Parameter(1.0, "1", "q")\n', 17, "the name 3 is no identifier"),
     "a condition on a contact force": (
-        DRY + STUCK.replace("F -", "choose(R > 0.0, F, 0.0) -"),
+        DRY + RATE_WITH_FRICTION.replace("F -", "choose(R > 0.0, F, 0.0) -"),
         18,
         "a condition in a compares R, which follows from a: use a condition on states",
     ),
@@ -545,7 +546,7 @@ WRONG = {
         "the start values are invalid: nominal_velocity of q must be above 0, got u = 1.0",
     ),
     "liftoff in words": (
-        DRY.replace("slide=f", 'slide=f, lifts_off="no"') + STUCK,
+        DRY.replace("slide=f", 'slide=f, lifts_off="no"') + RATE_WITH_FRICTION,
         17,
         "lifts_off must be True, False or None, got 'no'",
     ),
@@ -556,12 +557,12 @@ WRONG = {
         "q has the unit 'degC': use K for temperatures and for their differences",
     ),
     "friction with a direction": (
-        DRY.replace("slide=f", "slide=f * tanh(v / u)") + STUCK,
+        DRY.replace("slide=f", "slide=f * tanh(v / u)") + RATE_WITH_FRICTION,
         17,
         "slide of R changes its sign with the slip: write the size of the force",
     ),
     "friction without a value at rest": (
-        DRY.replace("slide=f", "slide=f * v / fabs(v), hold=f") + STUCK,
+        DRY.replace("slide=f", "slide=f * v / fabs(v), hold=f") + RATE_WITH_FRICTION,
         17,
         "R: f * v / fabs(v) cannot be calculated at the start values, where fabs(v) is 0.0",
     ),
@@ -617,7 +618,7 @@ WRONG = {
         "the argument of sin is an angle in rad, but fr * clock counts revolutions, as it has the unit Hz: write 2.0",
     ),
     "a holding force without a value at the start": (
-        DRY.replace("slide=f", "slide=f, hold=f * x / fabs(x)") + STUCK,
+        DRY.replace("slide=f", "slide=f, hold=f * x / fabs(x)") + RATE_WITH_FRICTION,
         17,
         "R: f * x / fabs(x) cannot be calculated at the start values, where fabs(x) is 0.0",
     ),
@@ -650,7 +651,7 @@ def test_a_mistake_is_reported_in_one_sentence_with_its_line(wrong, tmp_path):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("name", RESERVED)
+@pytest.mark.parametrize("name", RESERVED_NAMES)
 def test_a_reserved_name_is_refused(name, tmp_path):
     """It belongs to the solver, to FMI, to C or to its compilers."""
     path = tmp_path / "mine.py"
@@ -700,20 +701,20 @@ def test_helper_values_of_the_class_body_are_allowed(tmp_path):
 
 def test_friction_may_be_zero_at_the_start(tmp_path):
     path = tmp_path / "mine.py"
-    path.write_text(HEAD.replace("f = Parameter(1.0", "f = Parameter(0.0") + DRY + STUCK + USE)
+    path.write_text(HEAD.replace("f = Parameter(1.0", "f = Parameter(0.0") + DRY + RATE_WITH_FRICTION + USE)
     assert scalar_class(path).f.start == 0.0
 
 
 def test_friction_may_have_no_value_at_high_speeds(tmp_path):
     path = tmp_path / "mine.py"
-    path.write_text(HEAD + DRY.replace("slide=f", "slide=f * sqrt(1.0 - 4.0 * v * v / (u * u))") + STUCK)
+    path.write_text(HEAD + DRY.replace("slide=f", "slide=f * sqrt(1.0 - 4.0 * v * v / (u * u))") + RATE_WITH_FRICTION)
     assert scalar_class(path).f.start == 1.0
 
 
 def test_friction_may_be_divided_by_an_input_that_starts_above_zero(tmp_path):
     path = tmp_path / "mine.py"
     tank = '    tank = Input(2.0, "kg", "mass of a tank")\n'
-    path.write_text(HEAD + tank + DRY.replace("slide=f", "slide=f * m / tank") + STUCK + USE)
+    path.write_text(HEAD + tank + DRY.replace("slide=f", "slide=f * m / tank") + RATE_WITH_FRICTION + USE)
     assert scalar_class(path).tank.start == 2.0
 
 
@@ -731,8 +732,8 @@ def test_the_signature_of_a_declaration_names_all_arguments(kind):
     arguments = inspect.signature(kind).parameters
     assert {"unit", "text", "low", "high", "above", "below", "display"} <= arguments.keys()
     assert not {"args", "kwargs", "more", "_"} & arguments.keys()
-    described = {word for line in kind.__doc__.splitlines() for word in line.strip().split(", ")}
-    assert arguments.keys() <= described
+    described_arguments = {word for line in kind.__doc__.splitlines() for word in line.strip().split(", ")}
+    assert arguments.keys() <= described_arguments
 
 
 def test_any_docstring_text_survives_unchanged(tmp_path):

@@ -28,10 +28,10 @@ class Names(Model):
     v = State("m/s", "speed", rate_of=x)
     mode = Mode()
 """
-ALONE = """    F = Contact("N", "friction force", mode=mode, slip=v, slide=f, hold=1.2 * f, laws=(HYBRID, SIGN))
+ONE_CONTACT = """    F = Contact("N", "friction force", mode=mode, slip=v, slide=f, hold=1.2 * f, laws=(HYBRID, SIGN))
     a = Output("m/s2", "acceleration", (-k * x - choose(x > b, k * (x - b), 0.0) - F{more}) / m, rate_of=v)
 """
-TOGETHER = """    a_belt = Input(0.1, "m/s2", "acceleration of the belt")
+TWO_CONTACTS = """    a_belt = Input(0.1, "m/s2", "acceleration of the belt")
     v_belt = Input(0.2, "m/s", "speed of the belt", rate=a_belt)
     v_drive = Parameter(0.1, "m/s", "speed of the driver")
     x_drive = State("m", "position of the driver", rate=v_drive)
@@ -72,8 +72,8 @@ def write(folder, body, **roles):
 
 def public_attributes(model):
     """Return the names of all attributes of a class and its instances, also of those that are only annotated."""
-    annotated = {name for base in model.__mro__ for name in get_annotations(base)}
-    return {name for name in {*dir(model), *vars(model()), *annotated} if not name.startswith("_")}
+    annotated_names = {name for base in model.__mro__ for name in get_annotations(base)}
+    return {name for name in {*dir(model), *vars(model()), *annotated_names} if not name.startswith("_")}
 
 
 def used_names(body, folder):
@@ -83,8 +83,8 @@ def used_names(body, folder):
         node.id.rstrip("123456789") for node in ast.walk(ast.parse(source.generated_source)) if hasattr(node, "id")
     }
     attributes = public_attributes(scalar_class(source)) | public_attributes(lowered_model(source))
-    own = {e.name for e in source.analysis.declared}
-    return sorted(attributes - own), sorted(names - attributes - own - {*fmus.__all__})
+    variable_names = {e.name for e in source.analysis.declared}
+    return sorted(attributes - variable_names), sorted(names - attributes - variable_names - {*fmus.__all__})
 
 
 def refusal(name, role, body, folder):
@@ -96,15 +96,15 @@ def refusal(name, role, body, folder):
     return ""
 
 
-@pytest.mark.parametrize("body", campaign_after(1, [ALONE, TOGETHER]))
+@pytest.mark.parametrize("body", campaign_after(1, [ONE_CONTACT, TWO_CONTACTS]))
 def test_an_attribute_of_a_generated_class_is_no_name_of_a_variable(body, tmp_path):
     """But the names of constants, as limit or A_F_F, are those that no variable has."""
     attributes, _ = used_names(body, tmp_path)
     refusals = {(name, role): refusal(name, role, body, tmp_path) for name in attributes for role in ROLES}
     assert all(message.endswith(REFUSALS) for message in refusals.values() if message)
-    accepted = {name for (name, _), message in refusals.items() if not message}
-    assert accepted == {name for name in attributes if name.startswith(("limit", "A_", "slide"))}
-    assert {"rates", "stop_time", "condition_texts", "inconsistent_input"} <= {*attributes} - accepted
+    accepted_names = {name for (name, _), message in refusals.items() if not message}
+    assert accepted_names == {name for name in attributes if name.startswith(("limit", "A_", "slide"))}
+    assert {"rates", "stop_time", "condition_texts", "inconsistent_input"} <= {*attributes} - accepted_names
 
 
 @pytest.mark.campaign
@@ -116,14 +116,14 @@ def test_any_other_name_gives_the_same_motion(backend, turn, tmp_path):
     """Each name that the generated methods use, in each role."""
     if backend:
         require_compiler()
-    attributes, others = used_names(TOGETHER, tmp_path)
-    names = [name for name in attributes + others if not refusal(name, "input", TOGETHER, tmp_path)]
-    roles = {name: [*ROLES][(place + turn) % len(ROLES)] for place, name in enumerate(names)}
+    attributes, others = used_names(TWO_CONTACTS, tmp_path)
+    names = [name for name in attributes + others if not refusal(name, "input", TWO_CONTACTS, tmp_path)]
+    roles = {name: [*ROLES][(index + turn) % len(ROLES)] for index, name in enumerate(names)}
     assert {"u", "A_F_F", "impulse_F", "scale_of_x_drive"} <= roles.keys()
-    plain = {f"ours{place}": role for place, role in enumerate(roles.values())}
+    plain = {f"ours{index}": role for index, role in enumerate(roles.values())}
     columns = []
     for variant in roles, plain:
-        path = write(tmp_path, TOGETHER, **variant)
+        path = write(tmp_path, TWO_CONTACTS, **variant)
         fmu = build_user_model(path, *BACKENDS[backend], "--method", "ode45") / backend / "names.fmu"
         result = harness.simulate(fmu, times=np.linspace(0.0, 0.5, 51))
         outputs = [name for name, role in variant.items() if role in ("state", "output")]

@@ -87,7 +87,7 @@ def test_a_slip_that_only_touches_zero_is_no_event():
     """With equal static and sliding friction the slip is v (1 - cos(w t)) and touches zero once in each period."""
     solution = solve(sled(0.3, 0.3, stop=3.0))
     assert [modes for _, modes in solution.events] == [(1,)]
-    touches = [one.t for one in solution.decisions if one.kind == "touch"]
+    touches = [decision.t for decision in solution.decisions if decision.kind == "touch"]
     assert np.abs(np.diff([solution.events[0][0], *touches]) - 0.2 * np.pi).max() < 1e-7
     assert len(touches) == 4
 
@@ -104,7 +104,9 @@ def test_slips_and_rests_of_the_sled_have_their_closed_form(ratio):
     expected = high / (100.0 * v) + np.arange(len(times)) // 2 * (slip + rest) + np.arange(len(times)) % 2 * slip
     assert len(times) > 10
     assert np.abs(times - expected).max() < (1e-9 if ratio > 1.0001 else 1e-6)
-    depth = min(one.margin for one in solution.decisions if one.kind == "crossing") if ratio < 1.5 else 0.5
+    depth = (
+        min(decision.margin for decision in solution.decisions if decision.kind == "crossing") if ratio < 1.5 else 0.5
+    )
     assert 0.01 < depth / (w * lead / v) ** 2 * 4.0 < 20.0 or ratio == 1.5
 
 
@@ -119,17 +121,17 @@ def test_random_models_agree_with_an_independent_solver(worker, number):
     structure = random_structure(number)
 
     def make(folder):
-        _, refused = random_campaign.build([structure], folder)
-        assert not refused, refused[0].text
+        _, refusals = random_campaign.build([structure], folder)
+        assert not refusals, refusals[0].text
 
     folder = build_cache.keep_build(structure.name, make)
     paths = {(number, backend): folder / backend / f"{structure.name}.fmu" for backend in random_campaign.BACKENDS}
-    compared = 0
+    n_compared = 0
     for seed in VALUES:
         reference = random_campaign.make_reference(structure, seed)
         failures, counts, _ = random_campaign.run_case(
             worker, paths, structure, seed, reference, slow_backends=("python", "fmi3")
         )
         assert not failures, "\n".join(map(str, failures))
-        compared += counts["compared events", 1e-11]
-    assert compared > len(VALUES)
+        n_compared += counts["compared events", 1e-11]
+    assert n_compared > len(VALUES)

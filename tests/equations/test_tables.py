@@ -158,8 +158,8 @@ def test_values_are_those_of_numpy_and_scipy_in_each_kind_of_fmu(worker, tmp_pat
         fmu = worker.instantiate(path).begin({}, stop=12.0)
         rows.append(fmu.run(np.linspace(0.0, 12.0, 241).tolist(), names))
         fmu.free()
-        carried = harness.describe(path).tables
-        assert [(t.interpolation, t.ends, ([*t.x], [*t.y])) for t in carried] == [*tables.values()]
+        fmu_tables = harness.describe(path).tables
+        assert [(t.interpolation, t.ends, ([*t.x], [*t.y])) for t in fmu_tables] == [*tables.values()]
     u, *columns = np.array(rows[0]).T
     for column, (name, (kind, ends, (x, y))) in zip(columns, tables.items(), strict=True):
         smooth = PchipInterpolator(x, y)
@@ -258,7 +258,7 @@ def test_importers_integrate_tables_and_get_exact_derivatives(worker, tmp_path):
         for speed, slope in (0.005, -15.0), (0.05, -0.05 / 0.09), (0.3, 0.05), (2.0, 0.0):
             move(fmu, 0.15, -speed)
             knowns = [number["x"], number["v"]]
-            by_x, by_v = (fmu.getDirectionalDerivative([number["a"]], [one], [1.0])[0] for one in knowns)
+            by_x, by_v = (fmu.getDirectionalDerivative([number["a"]], [state], [1.0])[0] for state in knowns)
             assert (by_x, by_v) == pytest.approx((-700.0, -N * slope), rel=1e-12)
             assert list(fmu.getAdjointDerivative([number["a"]], knowns, [1.0], 2)) == [by_x, by_v]
 
@@ -267,8 +267,8 @@ def test_importers_integrate_tables_and_get_exact_derivatives(worker, tmp_path):
 def fmi3_instance(path, folder):
     """An initialized instance for model exchange, and the value references by name."""
     description = fmpy.read_model_description(path)
-    unzipped = str(fmpy.extract(path, folder / "unzipped"))
-    fmu = FMU3Model(guid=description.guid, unzipDirectory=unzipped, modelIdentifier="bench")
+    unzipped_folder = str(fmpy.extract(path, folder / "unzipped"))
+    fmu = FMU3Model(guid=description.guid, unzipDirectory=unzipped_folder, modelIdentifier="bench")
     fmu.instantiate()
     fmu.enterInitializationMode()
     fmu.exitInitializationMode()
@@ -312,7 +312,7 @@ def test_values_may_be_parameters(worker, tmp_path):
 
 TUNABLE = ((0.0, 0.01, 0.1, 0.5, 1.0), (0.5, 0.3, 0.0, 0.3, 0.3))  # start values
 ELEMENTS = [f"mu.y[{n}]" for n in range(1, 6)]
-FITTED = {"mu.y[2]": 0.35, "mu.y[3]": 0.28}
+FITTED_VALUES = {"mu.y[2]": 0.35, "mu.y[3]": 0.28}
 
 
 @pytest.fixture(scope="module")
@@ -331,10 +331,10 @@ def test_values_of_a_table_have_structured_names(tunable_fmus):
     for path in tunable_fmus.values():
         description = fmpy.read_model_description(path, validate_variable_names=True)
         assert description.variableNamingConvention == "structured"
-        declared = {v.name: v for v in description.modelVariables if v.name.startswith("mu.")}
-        assert [*declared] == ELEMENTS
-        assert " ".join(v.start for v in declared.values()) == "0.5 0.3 0.0 0.3 0.3"
-        assert {v.variability for v in declared.values()} == {"tunable"}
+        variables = {v.name: v for v in description.modelVariables if v.name.startswith("mu.")}
+        assert [*variables] == ELEMENTS
+        assert " ".join(v.start for v in variables.values()) == "0.5 0.3 0.0 0.3 0.3"
+        assert {v.variability for v in variables.values()} == {"tunable"}
         info = harness.describe(path)
         assert [v.name for v in info.variables if v.name.startswith("mu.")] == ELEMENTS == [*info.tables[0].parameters]
         assert (info["mu.y[2]"].start, info["mu.y[2]"].low) == (0.3, 0.0)
@@ -377,10 +377,10 @@ def test_derivatives_by_values_of_a_table_are_exact(tunable_fmus, tmp_path):
 @pytest.mark.parametrize("kind", ["native/fmi3"])
 def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
     """Without ranges to search: one of them starts at zero, and both have the scale of the table."""
-    run = harness.simulate(tunable_fmus["native"], FITTED, times=np.linspace(0.0, STOP, 101), rtol=1e-10)
+    run = harness.simulate(tunable_fmus["native"], FITTED_VALUES, times=np.linspace(0.0, STOP, 101), rtol=1e-10)
     record = {"t": run.time, "x": run["x"]}
-    fit = harness.fit(tunable_fmus[kind], record, [*FITTED], observe=["x"], sigma={"x": 1e-5})
-    for name, value in FITTED.items():
+    fit = harness.fit(tunable_fmus[kind], record, [*FITTED_VALUES], observe=["x"], sigma={"x": 1e-5})
+    for name, value in FITTED_VALUES.items():
         assert fit[name].value == pytest.approx(value, rel=1e-4)
 
 
@@ -422,8 +422,8 @@ def test_values_of_a_file_become_parameters_that_keep_their_kind(tmp_path):
     (tmp_path / "mu.csv").write_text("v [m/s],mu [1]\n0,0.5\n1,0.25\n")
     text = MODEL.format(friction='"mu.csv", values="fixed", low=0.125', spring=points(SPRING, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text)
-    declared = [d for d in declarations(scalar_class(tmp_path / "bench.py")) if d.name.startswith("mu_")]
-    elements = [(d.element, d.start, d.unit, d.low, d.variability, d.text) for d in declared]
+    parameters = [d for d in declarations(scalar_class(tmp_path / "bench.py")) if d.name.startswith("mu_")]
+    elements = [(d.element, d.start, d.unit, d.low, d.variability, d.text) for d in parameters]
     assert elements == [
         ("mu.y[1]", 0.5, "1", 0.125, "fixed", "value at 0 m/s"),
         ("mu.y[2]", 0.25, "1", 0.125, "fixed", "value at 1 m/s"),
@@ -490,10 +490,10 @@ WRONG = {
 def test_a_wrong_table_is_refused_in_one_sentence(tmp_path, name):
     table, message = WRONG[name]
     (tmp_path / "wrong.py").write_text(f'{HEAD}    T = {table}\n    y = Output("1", "value", T(clock))\n')
-    with pytest.raises(BuildError) as raised:
+    with pytest.raises(BuildError) as error:
         find_model(tmp_path / "wrong.py").generated_source  # noqa: B018
     line = 8 if name not in ("another unit",) else 9
-    assert str(raised.value).startswith(f"{tmp_path / 'wrong.py'}, line {line}: {message}")
+    assert str(error.value).startswith(f"{tmp_path / 'wrong.py'}, line {line}: {message}")
 
 
 @pytest.mark.parametrize(

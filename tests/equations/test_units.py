@@ -153,8 +153,10 @@ def test_a_motor_turns_at_the_speed_at_which_torques_balance(tmp_path):
     current = 0.02 / 0.05
     assert frame["i"].iloc[-1] == pytest.approx(current, rel=1e-6)
     assert frame["omega"].iloc[-1] == pytest.approx((12.0 - 1.2 * current) / 0.05, rel=1e-6)
-    stuck = frame[frame["mode"] == 0]  # with the rotor at rest the current is that of a coil
-    assert list(stuck["i"]) == pytest.approx([12.0 / 1.2 * (1.0 - exp(-1.2 / 2e-3 * t)) for t in stuck.index], rel=1e-9)
+    stuck_rows = frame[frame["mode"] == 0]  # with the rotor at rest the current is that of a coil
+    assert list(stuck_rows["i"]) == pytest.approx(
+        [12.0 / 1.2 * (1.0 - exp(-1.2 / 2e-3 * t)) for t in stuck_rows.index], rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(

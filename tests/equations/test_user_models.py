@@ -36,7 +36,7 @@ def command(*arguments, cwd):
     return commands.build(*arguments, folder=cwd)
 
 
-def built(path, kind):
+def build_fmu(path, kind):
     """Return the FMU, beside a copy of the file outside the project; for FMI 3.0, whose numerics are those of the
     native FMU, with the default method only. Those of the example models are optimised, as those of users."""
     method_option = ["--method", find_model(path).analysis.method] if kind == "native/fmi3" else []
@@ -47,7 +47,7 @@ def built(path, kind):
 @pytest.mark.parametrize("kind", campaign_after(2, KINDS))
 def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(kind):
     (path,) = (path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
-    fmu = built(path, kind)
+    fmu = build_fmu(path, kind)
     assert validate_fmu(str(fmu)) == []
     assert read_model_description(fmu).modelName == path.stem
     folder, *_ = [*kind.split("/"), ""]
@@ -62,13 +62,13 @@ def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(kind):
 @EVERY_FILE
 def test_python_and_native_agree_bit_for_bit(path, worker):
     """Outputs and counters, up to the stop time of the default run."""
-    described = read_model_description(built(path, ""))
-    names = [v.name for v in described.modelVariables if v.causality == "output" or v.name == "solver.steps"]
-    stop = float(described.defaultExperiment.stopTime)
+    description = read_model_description(build_fmu(path, ""))
+    names = [v.name for v in description.modelVariables if v.causality == "output" or v.name == "solver.steps"]
+    stop = float(description.defaultExperiment.stopTime)
     times = [stop * i / 50 for i in range(51)]
     rows = []
     for kind in ("", "native"):
-        fmu = worker.instantiate(built(path, kind)).begin({}, stop=stop)
+        fmu = worker.instantiate(build_fmu(path, kind)).begin({}, stop=stop)
         rows.append(fmu.run(times, names))
         fmu.free()
     assert_identical(*rows, names)
@@ -93,7 +93,9 @@ def test_its_motion_agrees_with_an_independent_formulation(law, start):
     path = next(path for path in EXAMPLE_MODELS if path.stem == law.__name__)
     stop = model_class(path).stop_time
     values = {"solver.rtol": 1e-11, "solver.method": 4}
-    simulation = simulate_fmu(built(path, "native"), stop_time=stop, output_interval=stop / 100, start_values=values)
+    simulation = simulate_fmu(
+        build_fmu(path, "native"), stop_time=stop, output_interval=stop / 100, start_values=values
+    )
     x, v = (s.name for s in find_model(path).analysis.states)
     true = solve_ivp(law, (0.0, stop), start, "DOP853", t_eval=simulation["time"], rtol=1e-12, atol=1e-13).y
     assert np.abs(simulation[x] - true[0]).max() < 1e-9
@@ -129,7 +131,7 @@ def test_its_friction_sticks_and_slips_when_the_equations_require(worker):
     """The events of the brake, and a rest."""
     path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     stop = model_class(path).stop_time
-    fmu = worker.instantiate(built(path, "native")).begin({"solver.rtol": 1e-11, "solver.method": 4}, stop=stop)
+    fmu = worker.instantiate(build_fmu(path, "native")).begin({"solver.rtol": 1e-11, "solver.method": 4}, stop=stop)
     t, events = 0.0, []
     while t < stop:
         ahead = fmu.get("solver.t_next")
@@ -152,8 +154,8 @@ def test_methods_laws_and_folders_are_selected_for_a_file_as_for_a_name(tmp_path
     assert (run.returncode, run.stderr) == (0, "")
     fmu = describe(tmp_path / "lean" / "rotor_brake.fmu")
     assert (fmu.methods, fmu.laws) == (("rodas",), ("hybrid",))
-    refused = command(path, "--method", "exact", cwd=tmp_path)
-    assert refused.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas, radau9.\n"
+    refusal = command(path, "--method", "exact", cwd=tmp_path)
+    assert refusal.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas, radau9.\n"
 
 
 @pytest.fixture
@@ -192,8 +194,8 @@ def test_a_model_file_may_be_named_like_a_python_module(oil):
     for name in ("math.py", "fmus.py", "random.py"):
         (folder / name).write_bytes(b"\xef\xbb\xbf" + (oil / "pendulum.py").read_bytes().replace(b"\n", b"\r\n"))
     for words in ("build_fmus", "fmus.py"), ("harness", "run", "fmus.fmu"):
-        done = subprocess.run([sys.executable, "-m", *words], cwd=folder, capture_output=True, text=True, timeout=300)
-        assert done.returncode == 0, done.stderr
+        result = subprocess.run([sys.executable, "-m", *words], cwd=folder, capture_output=True, text=True, timeout=300)
+        assert result.returncode == 0, result.stderr
 
 
 def harness(*arguments, cwd):
@@ -284,7 +286,7 @@ def test_an_invalid_result_is_refused(oil):
 
 
 def test_a_run_shows_events_whatever_the_name_of_the_mode(tmp_path):
-    fmu = built(next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake"), "")
+    fmu = build_fmu(next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake"), "")
     (tmp_path / "brake.toml").write_text(f'title = "Brake"\nfmu = "{fmu}"\noutputs = ["phi", "omega", "alpha"]\n')
     run = harness("run", "brake.toml", "--out", "results", cwd=tmp_path)
     assert run.returncode == 0, run.stderr
@@ -296,20 +298,20 @@ def test_a_run_shows_events_whatever_the_name_of_the_mode(tmp_path):
 @pytest.mark.parametrize("words", [["run"], ["precision"], ["stability"], ["references"], ["compare", "brake.py"]])
 def test_every_command_takes_its_path_and_explains_how_to_build_it(tmp_path, words):
     (tmp_path / "brake.py").write_text("")
-    done = harness(*words, "brake.py", cwd=tmp_path)
-    assert done.returncode
-    assert done.stderr.count("\n") == 1
-    assert "there is no brake.fmu: build it with `friction-fmus build brake.py`" in done.stderr
+    result = harness(*words, "brake.py", cwd=tmp_path)
+    assert result.returncode
+    assert result.stderr.count("\n") == 1
+    assert "there is no brake.fmu: build it with `friction-fmus build brake.py`" in result.stderr
 
 
 def test_it_is_run_and_compared_by_its_path_like_its_fmu(tmp_path):
     source = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
-    for path in (source, built(source, "")):
+    for path in (source, build_fmu(source, "")):
         (tmp_path / path.name).symlink_to(path)
     harness("run", "rotor_brake.py", cwd=tmp_path)
     assert "the same, bit for bit" in harness("run", "rotor_brake.fmu", cwd=tmp_path).stdout
-    done = harness("compare", "rotor_brake.py", "rotor_brake.fmu", "--atol", "0", "--stop", "1", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    result = harness("compare", "rotor_brake.py", "rotor_brake.fmu", "--atol", "0", "--stop", "1", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
 
 
 PUCK = '''
@@ -340,7 +342,7 @@ def puck(tmp_path):
 def test_a_model_may_have_one_state(puck, kind):
     """It slows by f / m, and comes to rest after m / f."""
     run = simulate_fmu(
-        str(built(puck, kind)), stop_time=1.0, output_interval=0.25, output=["v", "mode", "events.t_last"]
+        str(build_fmu(puck, kind)), stop_time=1.0, output_interval=0.25, output=["v", "mode", "events.t_last"]
     )
     assert np.abs(run["v"] - np.maximum(0.0, 1.0 - 1.5 * run["time"])).max() < 1e-12
     assert (run["mode"][-1], run["events.t_last"][-1]) == (0, pytest.approx(2.0 / 3.0, abs=1e-12))
@@ -350,11 +352,11 @@ def test_a_model_may_have_one_state(puck, kind):
 def test_sliding_friction_above_static_friction_is_refused_before_the_run(puck, worker, kind):
     """It could neither stay nor go: as built, and when a value is set."""
     sentence = "F: the sliding force exceeds the holding force (f = {}, grip = {}): lower slide or raise hold"
-    fmu = worker.instantiate(built(puck, kind))
+    fmu = worker.instantiate(build_fmu(puck, kind))
     puck.write_text(PUCK.replace("(4.0", "(2.0"))
-    done = command("puck.py", cwd=puck.parent)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert sentence.format(3.0, 2.0) in done.stderr
+    result = command("puck.py", cwd=puck.parent)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert sentence.format(3.0, 2.0) in result.stderr
     with pytest.raises(FmiError):
         fmu.begin({"f": 5.0}, stop=1.0).step(0.0, 1.0)
     assert sentence.format(5.0, 4.0) in str(fmu.messages())
@@ -381,7 +383,7 @@ def test_parameters_with_which_friction_drives_are_refused(puck, worker, kind):
     puck.write_text(PUCK.replace(", low=0.0", "").replace(", above=0.0", ""))
     for name, sentence in DRIVING.items():
         for before, during in ({name: -2.0}, {}), ({}, {name: -2.0}):
-            fmu = worker.instantiate(built(puck, kind))
+            fmu = worker.instantiate(build_fmu(puck, kind))
             with pytest.raises(FmiError):
                 run_with_a_change(fmu, before, during)
             assert sentence in str(fmu.messages())
@@ -415,12 +417,12 @@ class Texts(Model):
 def test_any_printable_text_survives_in_every_backend(kind, tmp_path, worker):
     """Trigraphs, delimiters and format fields of C, XML and Python; in descriptions and messages."""
     (tmp_path / "texts.py").write_text(TEXTS, encoding="utf-8")
-    done = command("texts.py", *KINDS[kind], "--method", "ode45", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    described = read_model_description(tmp_path / kind / "texts.fmu")
+    result = command("texts.py", *KINDS[kind], "--method", "ode45", cwd=tmp_path)
+    assert (result.returncode, result.stderr) == (0, "")
+    description = read_model_description(tmp_path / kind / "texts.fmu")
     names = ("m", "k", "k_max", "f", "x", "v", "mode", "F_friction", "a")
-    texts = {v.name: v.description for v in described.modelVariables if v.name in names}
-    assert described.description == f"{SPECIAL} {REAL_ONLY_HINT}"
+    texts = {v.name: v.description for v in description.modelVariables if v.name in names}
+    assert description.description == f"{SPECIAL} {REAL_ONLY_HINT}"
     assert texts == dict.fromkeys(names, SPECIAL) | {"mode": f"mode of F_friction: {SPECIAL}"}
     if kind == "native/fmi3":
         return  # its messages are those of the other native FMU

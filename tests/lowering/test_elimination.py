@@ -63,7 +63,7 @@ def on_lists(spec, g, h, J, r):
 def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
     """Also if a pivot nearly vanishes, as for a motion that grows within one step; the residual is small relative to
     the terms."""
-    spec, draw, refused = ModelLayout(BODIES[bodies], {}), np.random.default_rng(4), 0
+    spec, draw, n_refused = ModelLayout(BODIES[bodies], {}), np.random.default_rng(4), 0
     n, g, code = len(spec.states), 0.25, generate_real(spec)
     M = np.eye(n)
     for turn in range(600):
@@ -81,11 +81,11 @@ def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
         k = np.array(in_scalars(spec, code, g, h, J, r))
         assert np.array_equal(k, on_lists(spec, g, h, J, r), equal_nan=True)
         if not np.isfinite(k).all():
-            refused += 1
+            n_refused += 1
             continue
         terms = np.abs(k) + np.abs(g * h * J) @ np.abs(k) + np.abs(g * r)
         assert np.all(np.abs(k - g * h * (J @ k) - g * r) <= 1e-8 * terms.max())
-    assert 0 < refused < 480
+    assert 0 < n_refused < 480
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (2, 0, 4, 1, 3)], ids=["in a row", "shuffled, which fills zeros"])
@@ -93,27 +93,27 @@ def test_entries_that_are_always_zero_are_left_out_and_change_no_number(order):
     """Five bodies in a chain, each joined to its neighbours by springs and dampers, eliminated in some order."""
     states = {name: rate for i in order for name, rate in ((f"x{i}", f"v{i}"), (f"v{i}", f"a{i}"))}
     dense, names, draw = ModelLayout(states, {}), list(states), np.random.default_rng(5)
-    joined = np.array([[abs(int(one[1]) - int(other[1])) < 2 for other in names] for one in names])
+    is_joined = np.array([[abs(int(name[1]) - int(other[1])) < 2 for other in names] for name in names])
     spec = ModelLayout(
-        states, {}, zeros=frozenset(zip(*(indices.tolist() for indices in np.nonzero(~joined)), strict=True))
+        states, {}, zeros=frozenset(zip(*(indices.tolist() for indices in np.nonzero(~is_joined)), strict=True))
     )
     sparse_code, dense_code = generate_real(spec), generate_real(dense)
     assert len(sparse_code.co_code) < 0.7 * len(dense_code.co_code)
     for _ in range(100):
         h, r = 10.0 ** draw.uniform(-4.0, 1.0), draw.normal(0.0, 1.0, len(names))
-        J = np.where(joined, draw.normal(0.0, 1.0, joined.shape), 0.0)
+        J = np.where(is_joined, draw.normal(0.0, 1.0, is_joined.shape), 0.0)
         k = in_scalars(spec, sparse_code, 0.25, h, J, r)
         assert np.isfinite(k).all()
         assert k == in_scalars(dense, dense_code, 0.25, h, J, r)
         assert np.array_equal(k, on_lists(spec, 0.25, h, J, r))
 
 
-@pytest.mark.parametrize("undamped", [False, True])
+@pytest.mark.parametrize("is_undamped", [False, True])
 @pytest.mark.parametrize("bodies", BODIES)
-def test_a_complex_system_is_solved_alike_on_lists_and_in_scalars(bodies, undamped):
+def test_a_complex_system_is_solved_alike_on_lists_and_in_scalars(bodies, is_undamped):
     """The right-hand side is zero for states whose rate is a state; numpy solves the whole system."""
     spec, draw = ModelLayout(BODIES[bodies], {}), np.random.default_rng(6)
-    if undamped:  # no rate depends on its own state
+    if is_undamped:  # no rate depends on its own state
         spec = ModelLayout(BODIES[bodies], {}, zeros=frozenset((i, i) for i in spec.dynamic_states))
     names, rates, n = list(spec.states), list(spec.states.values()), len(spec.states)
     dynamic = spec.dynamic_states

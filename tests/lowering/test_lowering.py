@@ -41,18 +41,20 @@ def test_lists_and_scalars_give_the_same_bits_at_every_step(case):
 
 @pytest.mark.parametrize("path", [*MODELS, *LARGER_MODELS], ids=str)
 def test_the_runtime_declares_each_generated_method_with_its_arguments(path):
-    model, checked = scalar_class(path), set()
+    model, checked_names = scalar_class(path), set()
     components = {StateVector: model.states, ContactVector: model.contacts, ContactIndex: ()}
     for name, function in vars(model).items():
         if isfunction(function) and name != "__init__":
-            declared = next(vars(base)[name] for base in model.__mro__[1:] if name in vars(base))
-            types = declared.__annotations__
+            declaration = next(vars(base)[name] for base in model.__mro__[1:] if name in vars(base))
+            types = declaration.__annotations__
             expected = [
-                one for word in signature(declared).parameters for one in components.get(types.get(word), [word])
+                component
+                for word in signature(declaration).parameters
+                for component in components.get(types.get(word), [word])
             ]
             assert list(signature(function).parameters) == expected
-            checked.add(name)
-    assert {"prepare", "initial_state", "rates", "jacobian", "compute_outputs"} <= checked
+            checked_names.add(name)
+    assert {"prepare", "initial_state", "rates", "jacobian", "compute_outputs"} <= checked_names
 
 
 @EVERY_MODEL
@@ -95,9 +97,9 @@ def test_unreachable_code_is_removed():
 def test_a_traceback_points_into_the_source(name):
     model = model_class(name)()
     run = prepared_run(model, {})
-    with pytest.raises(TypeError) as caught:
+    with pytest.raises(TypeError) as error:
         run.solver.start(model, 0.0, *model.initial_state(0.0), "never", 1e-6)
-    frame = traceback.extract_tb(caught.value.__traceback__)[-1]
+    frame = traceback.extract_tb(error.value.__traceback__)[-1]
     assert frame.filename == str(ROOT / "fmus" / "runtime" / "integrator.py")
     assert frame.line == "duration = t_end - t if t_end < inf else model.stop_time"
 
@@ -193,7 +195,7 @@ def test_every_statement_keeps_the_number_of_its_source_line(name):
         ast.ClassDef: ("class ",),
         ast.Return: ("return",),
     }
-    rewritten = 0
+    n_rewritten = 0
     for path, tree in lower_all(find_model(name), select_features(find_model(name))).items():
         if not path.startswith("runtime/"):
             continue
@@ -202,8 +204,8 @@ def test_every_statement_keeps_the_number_of_its_source_line(name):
             if type(node) in words:
                 line = source[node.lineno - 1].strip()
                 assert line.startswith(words[type(node)]), (path, node.lineno)
-                rewritten += not ast.unparse(ast.fix_missing_locations(node)).startswith(line)
-    assert rewritten > 5
+                n_rewritten += not ast.unparse(ast.fix_missing_locations(node)).startswith(line)
+    assert n_rewritten > 5
 
 
 def test_the_tree_of_a_function_has_the_line_numbers_of_its_file():

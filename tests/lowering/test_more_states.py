@@ -43,21 +43,23 @@ def test_lists_and_scalars_give_the_same_bits_at_every_step(name, method):
 
 def integrate(name, method):
     """Run the lowered model; return the state at the stop, and time and modes of every event."""
-    one, stop = complete_model(FILES[name])(), STOPS[name]
-    run = prepared_run(one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]})
-    start(one, run, one.initial_state(0.0), stop)
+    model, stop = complete_model(FILES[name])(), STOPS[name]
+    run = prepared_run(
+        model, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]}
+    )
+    start(model, run, model.initial_state(0.0), stop)
     step, events = run.solver.step, []
     while step.t1 < stop:
-        assert compute_step(one, run) == 0
+        assert compute_step(model, run) == 0
         if step.event_at_end:
-            events.append((step.t1, *components(step, "modes1", one.contacts)))
-    return components(step, "y1", one.states), events
+            events.append((step.t1, *components(step, "modes1", model.contacts)))
+    return components(step, "y1", model.states), events
 
 
 @EVERY_METHOD
 def test_bristles_agree_with_an_independent_solver(method):
-    certified = load_reference("lugre", MORE)
-    truth = certified.states[certified.times.tolist().index(STOPS["lugre"])]
+    reference = load_reference("lugre", MORE)
+    truth = reference.states[reference.times.tolist().index(STOPS["lugre"])]
     final, _ = integrate("lugre", method)
     assert np.abs(np.array(final) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-10)
 
@@ -76,12 +78,12 @@ def test_contacts_stick_and_slip_as_in_an_independent_solver(name, method):
 
 
 def test_a_stuck_sled_keeps_zero_speed_while_the_other_moves():
-    one = lowered_model(FILES["sleds"])()
-    run = prepared_run(one, {"solver.method": DOP853, "solver.rtol": 1e-9})
-    start(one, run, one.initial_state(0.0), 16.0)
+    model = lowered_model(FILES["sleds"])()
+    run = prepared_run(model, {"solver.method": DOP853, "solver.rtol": 1e-9})
+    start(model, run, model.initial_state(0.0), 16.0)
     step, n_stuck = run.solver.step, 0
     while step.t1 < 16.0:
-        assert compute_step(one, run) == 0
+        assert compute_step(model, run) == 0
         for mode, speed in ("mode_1", "v_1"), ("mode_2", "v_2"):
             if components(step, "modes0", [mode]) == [0]:
                 speeds = components(step, "y0", [speed]) + components(step, "y1", [speed])

@@ -42,7 +42,7 @@ NAMES = {
 }
 NATIVE = ("--native", "--platform", "linux64")
 INDICATORS = [f"events.{kind}_mode_{n}" for kind in ("to_rest", "to_break_away") for n in (1, 2)]
-CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
+CHOICE_FORMATS = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 
 def numbers(path, model, names):
@@ -68,10 +68,10 @@ def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
     expected = numbers(path, lowered_model(path)(), default_names)
     assert len(expected) > 20
     for names in NAMES[text]:
-        changed = text
+        changed_text = text
         for old, new in zip(default_names, names, strict=True):
-            changed = changed.replace(old, new)
-        path.write_text(changed)
+            changed_text = changed_text.replace(old, new)
+        path.write_text(changed_text)
         assert numbers(path, lowered_model(path)(), names) == expected, names
     assert text == SLED or "typedef struct Mine Model;" in render_model_header(
         lowered_model(path), "3"
@@ -80,15 +80,17 @@ def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
 
 def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_path):
     path, labels = tmp_path / "mine.py", [*METHODS, *LAWS]
-    items, cases = (", ".join(item.format(*pair) for pair in zip(labels, "123456789", strict=True)) for item in CHOSEN)
+    items, cases = (
+        ", ".join(item.format(*pair) for pair in zip(labels, "123456789", strict=True)) for item in CHOICE_FORMATS
+    )
     text = SLED.replace("import Contact", "import Choice, Contact").replace("- F)", f"* kind.choose({cases}) - F)")
     path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
     source = find_model(path)
-    lowered = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))
-    choices = [*declared_variables(lowered), *fixed_choices(lowered)]
+    model_class = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))
+    choices = [*declared_variables(model_class), *fixed_choices(model_class)]
     labels_by_name = {name: [label for label, _, _ in meaning.items] for name, meaning in choices if meaning.items}
     assert labels_by_name == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
-    model, rates = lowered(), set()
+    model, rates = model_class(), set()
     for model.kind in range(1, 9):
         assert model.prepare() == 0
         rates.add(model.rates(0.0, 0.1, 0.0, 1))
