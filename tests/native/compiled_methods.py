@@ -55,7 +55,7 @@ class CompiledMethods:
     def __init__(self, owner, methods, folder, warnings=STRICT):
         call_graph = CallGraph(owner)
         cls = type(owner)
-        state = list(c_member_paths(call_graph.layout, cls, "it."))
+        state = list(c_member_paths(call_graph.layout, cls, "instance."))
         calls, self.widths = [], {}
         for name in methods:
             result = call_graph.add_model_entry_point(f"run_{name}", getattr(cls, name), FLOAT, FLOAT).result
@@ -63,8 +63,8 @@ class CompiledMethods:
             self.widths[name] = len(parts)
             calls.append(
                 f"int {name}(double x, double y, double *out) {{\n"
-                f"    struct {cls.__name__} it = image;\n    bool fault = false;\n"
-                f"    {result.c} r = run_{name}(&it, x, y, &fault);\n"
+                f"    struct {cls.__name__} instance = image;\n    bool fault = false;\n"
+                f"    {result.c} r = run_{name}(&instance, x, y, &fault);\n"
                 + "".join(f"    *out++ = (double){part};\n" for part in parts + state)
                 + "    return fault;\n}\n"
             )
@@ -83,7 +83,7 @@ class CompiledMethods:
         return bool(fault), list(out)
 
 
-def assert_same_as_python(frozen, owner, name, pairs):
+def assert_same_as_python(compiled_methods, owner, name, pairs):
     """Compare results, final object states and exceptions (faults in C) of a method in C and CPython."""
     for x, y in pairs:
         python_owner = copy.deepcopy(owner)
@@ -91,10 +91,10 @@ def assert_same_as_python(frozen, owner, name, pairs):
             result = getattr(python_owner, name)(x, y)
         except FAULT_EXCEPTIONS as error:
             result = error
-        fault, out = frozen.call(name, x, y)
+        fault, out = compiled_methods.call(name, x, y)
         assert fault == isinstance(result, Exception), f"{name}({x!r}, {y!r}): {result!r}"
         members = list(flat_values(python_owner))
         values = [] if fault else [*result] if isinstance(result, tuple) else [result]
         if fault:  # a fault returns no value, but earlier side effects remain
-            out = out[frozen.widths[name] :]
+            out = out[compiled_methods.widths[name] :]
         assert bits(out[: len(values) + len(members)]) == bits(values + members), f"{name}({x!r}, {y!r})"

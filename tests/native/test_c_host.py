@@ -58,9 +58,9 @@ def test_the_process_has_no_python_and_agrees_with_the_python_fmu(fmu, fmus, wor
     )
     run = f"0 run 0 {stop} 200 {' '.join(str(value_references(name)[v]) for v in names_to_read)}"
     *answers, last = run_host_script(fmu, [*begin(0, stop=stop), "0 libraries", run])[0]
-    mapped = [line for line in answers if line.startswith("mapped ")]
-    assert any(path.endswith(f"{name}.so") for path in mapped)
-    assert not [path for path in mapped if "python" in path.lower()]
+    mapped_files = [line for line in answers if line.startswith("mapped ")]
+    assert any(path.endswith(f"{name}.so") for path in mapped_files)
+    assert not [path for path in mapped_files if "python" in path.lower()]
     python = worker.instantiate(fmus / f"{name}.fmu").begin(stop=stop)
     times = [stop * i / 200 for i in range(201)]
     assert numbers(last) == python.run(times, names_to_read)[-1]
@@ -68,12 +68,12 @@ def test_the_process_has_no_python_and_agrees_with_the_python_fmu(fmu, fmus, wor
 
 def test_two_hundred_instances_do_not_interfere(fmu):
     name = fmu.stem
-    separate, _ = run_host_script(fmu, [line for i in range(CROWD) for line in [*life(i, name), f"{i} free"]])
-    together = [line for step in zip(*(life(i, name) for i in range(CROWD)), strict=True) for line in step]
-    mixed, _ = run_host_script(fmu, together + [f"{i} free" for i in range(CROWD)])
-    steps = len(mixed) // CROWD
-    assert len(set(separate)) > CROWD  # the instances differ
-    assert [mixed[k * CROWD + i] for i in range(CROWD) for k in range(steps)] == separate
+    separate_answers, _ = run_host_script(fmu, [line for i in range(CROWD) for line in [*life(i, name), f"{i} free"]])
+    interleaved_lines = [line for step in zip(*(life(i, name) for i in range(CROWD)), strict=True) for line in step]
+    mixed_answers, _ = run_host_script(fmu, interleaved_lines + [f"{i} free" for i in range(CROWD)])
+    steps = len(mixed_answers) // CROWD
+    assert len(set(separate_answers)) > CROWD  # the instances differ
+    assert [mixed_answers[k * CROWD + i] for i in range(CROWD) for k in range(steps)] == separate_answers
 
 
 def test_instances_coexist_in_threads(fmu):
@@ -90,20 +90,22 @@ def test_a_hundred_life_cycles_of_fmi3_agree_with_fmpy(worker, name):
     fmu, (x, v, *_), half = fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu", outputs(name), 0.5
     half *= model_class(name).stop_time
     times = [start + half * i / (STEPS // 2) for start in (0.0, half) for i in range(STEPS // 2)] + [2.0 * half]
-    one = worker.instantiate(fmu).begin()
-    (*_, expected) = one.run(times, [x, v])
-    one.free()
+    instance = worker.instantiate(fmu).begin()
+    (*_, expected) = instance.run(times, [x, v])
+    instance.free()
     assert ends_of_lives(fmu, exchange=False) == [expected]
 
-    one = worker.exchange(fmu).begin()
+    instance = worker.exchange(fmu).begin()
     for t in times[1:]:
-        one.update_discrete_states()
-        one.enter_continuous_time()
+        instance.update_discrete_states()
+        instance.enter_continuous_time()
         h = half / (STEPS // 2)
-        one.set_point(t, [state + h * rate for state, rate in zip(one.get_states(), one.rates(), strict=True)])
-        one.enter_event_mode()
-    expected = one.get(x, v)
-    one.free()
+        instance.set_point(
+            t, [state + h * rate for state, rate in zip(instance.get_states(), instance.rates(), strict=True)]
+        )
+        instance.enter_event_mode()
+    expected = instance.get(x, v)
+    instance.free()
     assert ends_of_lives(fmu, exchange=True) == [expected]
 
 
@@ -215,11 +217,11 @@ def run_failures(fmu, sanitizers, n_instances):
 def test_every_failure_is_one_sentence_in_the_log_and_on_standard_error(fmu):
     answers, stderr = run_host_script(fmu, failures(fmu.stem))
     messages = [line.split(" ", 4)[4] for line in answers if line.startswith("log ")]
-    printed = re.findall(rf"^{fmu.stem.capitalize()} \((?:0|x)\): (.*)", stderr, re.MULTILINE)
+    printed_messages = re.findall(rf"^{fmu.stem.capitalize()} \((?:0|x)\): (.*)", stderr, re.MULTILINE)
     assert len(messages) > 50
-    unheard = list((Counter(printed) - Counter(messages)).elements())
+    unheard = list((Counter(printed_messages) - Counter(messages)).elements())
     assert len(unheard) == 2, unheard  # one instance has no logger; one error has a disabled category
-    assert set(messages) <= set(printed)
+    assert set(messages) <= set(printed_messages)
     assert all(
         line.startswith(("log 0 3 logStatusError ", "log x 3 logStatusError "))
         for line in answers
@@ -257,9 +259,10 @@ def test_a_call_out_of_sequence_is_refused_and_changes_nothing(stickslip, phase,
         assert "refused" not in stderr
     else:
         assert answers[1] == ERROR
-        allowed = " or ".join(CALLS[call])
+        allowed_phases = " or ".join(CALLS[call])
         assert re.search(
-            rf"fmi2\w+ is refused: the FMU is {phase}, but the call is allowed only when it is {allowed}$", answers[0]
+            rf"fmi2\w+ is refused: the FMU is {phase}, but the call is allowed only when it is {allowed_phases}$",
+            answers[0],
         )
         assert numbers(answers[2]) == [model_class("stickslip").m.start]
 

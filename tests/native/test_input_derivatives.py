@@ -32,7 +32,7 @@ DAMPING = {  # stiffness, damping
 }
 PIECES = ((0.0, 0.3, 2.0), (1.0, 2.3, -3.0), (2.5, -2.2, 1.7))  # start time, force, and its rate
 HARD = ((0.0, 0.0, 80.0), (2.0, 160.0, -120.0), (5.0, -200.0, 60.0))  # enough to drag the sled
-HELD, SLID = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
+HOLDING_FORCE, SLIDING_FORCE = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
 POUND, INCH = 0.45359237, 0.0254
 
 
@@ -79,7 +79,7 @@ def test_a_ramp_is_exact_through_stick_and_slip_for_every_damping(launch, dampin
 @pytest.mark.parametrize(("v_driver", "k"), [(0.034, 742.5), (0.0, 742.5), (0.034, 0.0)])
 def test_a_ramp_breaks_the_sled_away_on_time_with_and_without_its_driver(launch, v_driver, k):
     fmu = launch("stickslip", {"v_driver": v_driver, "k": k}, stop=None)
-    assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), HARD, 10.0) >= 3
+    assert agree(fmu, Body(m=12.5, k=k, hold=HOLDING_FORCE, slide=SLIDING_FORCE, u=v_driver), HARD, 10.0) >= 3
 
 
 def random_force(source, n, h, f):
@@ -225,7 +225,11 @@ def test_every_method_breaks_away_and_stops_under_a_ramp(launch, name, method):
     values = {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method]}
     sled, pieces = name == "stickslip", HARD if name == "stickslip" else PIECES
     fmu = launch(name, values, stop=None)
-    body = Body(m=12.5, k=742.5, hold=HELD, slide=SLID, u=0.034) if sled else Body(k=157.9, hold=0.5, slide=0.5, x=0.1)
+    body = (
+        Body(m=12.5, k=742.5, hold=HOLDING_FORCE, slide=SLIDING_FORCE, u=0.034)
+        if sled
+        else Body(k=157.9, hold=0.5, slide=0.5, x=0.1)
+    )
     times, names = [0.25 * n for n in range(1, 25)], ("x", "v", "events.t_last")
     assert_close(run_with_inputs(fmu, pieces, times, names), sample_motion(body, pieces, times), names, 1e-5)
     assert fmu.get("events.count") == len(body.events) >= 2
@@ -332,16 +336,16 @@ def test_a_ramp_may_begin_before_the_run(worker, fmus):
 
 # ---- output derivatives
 
-BUILT = {"FMI 2.0": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.build_fmi3_fmus}
+BUILDERS = {"FMI 2.0": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.build_fmi3_fmus}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("version", BUILT)
+@pytest.mark.parametrize("version", BUILDERS)
 @pytest.mark.parametrize("name", MODELS)
 def test_output_derivatives_agree_with_differences(worker, name, version):
     """Central differences of fourth order, in stick and slip; the input ramps where allowed."""
-    h, (force, size), names = 1e-3, push(name), [one for one in outputs(name) if one != "mode"]
-    fmu = worker.instantiate(BUILT[version]() / f"{name}.fmu").begin({"solver.rtol": 1e-12})
+    h, (force, size), names = 1e-3, push(name), [output for output in outputs(name) if output != "mode"]
+    fmu = worker.instantiate(BUILDERS[version]() / f"{name}.fmu").begin({"solver.rtol": 1e-12})
     if version == "FMI 2.0":
         fmu.ramp(force, 0.1 * size)
     t, derivatives = 0.0, []
@@ -366,9 +370,13 @@ def test_output_derivatives_agree_with_differences(worker, name, version):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_description_declares_the_supported_orders(fmus, name):
-    two, three = (read_model_description(folder / f"{name}.fmu") for folder in (fmus, fmi3_fixtures.build_fmi3_fmus()))
-    assert two.coSimulation.canInterpolateInputs
-    assert [one.coSimulation.maxOutputDerivativeOrder for one in (two, three)] == [1, 1]
+    fmi2_description, fmi3_description = (
+        read_model_description(folder / f"{name}.fmu") for folder in (fmus, fmi3_fixtures.build_fmi3_fmus())
+    )
+    assert fmi2_description.coSimulation.canInterpolateInputs
+    assert [
+        description.coSimulation.maxOutputDerivativeOrder for description in (fmi2_description, fmi3_description)
+    ] == [1, 1]
 
 
 def test_invalid_input_derivatives_are_refused_and_change_nothing(launch):

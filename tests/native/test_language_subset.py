@@ -34,11 +34,11 @@ class Base:
     def shape(self, x):
         return x * x
 
-    def halved(self, x):
+    def half_shape(self, x):
         return half(self.shape(x))
 
 
-class Allowed(Base):
+class AllowedConstructs(Base):
     """One method for each construct."""
 
     kind = 2
@@ -89,7 +89,7 @@ class Allowed(Base):
     def tests(self, x, y):
         return math.isfinite(x), math.isnan(y), math.isinf(x * y), math.isfinite(x) and not math.isnan(y)
 
-    def converted(self, x, y):
+    def conversion(self, x, y):
         return float(self.n) * x, int(self.row[2]) + self.n
 
     def comparisons(self, x, y):
@@ -127,17 +127,17 @@ class Allowed(Base):
     def constants_of_a_class(self, x, y):
         return x if self.smooth and self.kind == 2 else y
 
-    def endless(self, x, y):
+    def endless_loop(self, x, y):
         tries = 0
         while True:
             x = half(x)
             tries += 1
             if not math.fabs(x) > math.fabs(y) + 1e-3 or tries == 40:
-                done = x
+                result = x
                 break
-        return done, tries
+        return result, tries
 
-    def guarded(self, x, y):
+    def guarded_loop(self, x, y):
         remaining = 30
         while True:
             if not (remaining > 0 and 1.0 / x < y):
@@ -155,7 +155,7 @@ class Allowed(Base):
             self.b = x
         return self.left.total
 
-    def counted(self, x, y):
+    def counted_loops(self, x, y):
         for i in range(FEW):
             self.row[i] = self.row[i] * x + i * y
             if self.row[i] > 1e3:
@@ -173,19 +173,19 @@ class Allowed(Base):
         self.row[i] = y / x
         return self.row[i] + self.row[2]
 
-    def at_once(self, x, y):
+    def simultaneous_assignments(self, x, y):
         self.a, self.b = self.b, self.a
         self.b, x, self.a = x, y, x / self.b
         x, y = y, x
         return x, y
 
-    def together(self, x, y):
+    def chained_assignments(self, x, y):
         self.a = self.b = z = x * y
         self.n = m = 4
         self.left.total = z - half(y)
         return z, m
 
-    def several(self, x, y):
+    def several_results(self, x, y):
         p, _ = self.arithmetic_pair(x, y)
         self.a, self.b = self.division_pair(p, y)
         return self.arithmetic_pair(self.a, self.b)
@@ -198,12 +198,12 @@ class Allowed(Base):
         self.left.calls += 2
         return x
 
-    def owned(self, x, y):
+    def parts(self, x, y):
         part = self.left
         part.take(x)
         self.right.take(part.total)
         part.count()
-        z = self.halved(y)
+        z = self.half_shape(y)
         return z, part.take(y)
 
     def effects_before(self, x, y):
@@ -221,21 +221,25 @@ class Allowed(Base):
     def effects_after_a_fault(self, x, y):
         return self.left.take(x / y)
 
-    def from_within(self, x, y):
+    def nested_return(self, x, y):
         if self.left.take(x) > 0.0:
             return self.effects_then_fault(x, y)
         self.n += 1
         return math.log(y)
 
 
-METHODS = [name for name in vars(Allowed) if callable(vars(Allowed)[name]) and name not in ("__init__", "shape")]
+METHODS = [
+    name
+    for name in vars(AllowedConstructs)
+    if callable(vars(AllowedConstructs)[name]) and name not in ("__init__", "shape")
+]
 
 
 @pytest.fixture(scope="module")
-def allowed(tmp_path_factory):
-    return CompiledMethods(Allowed(), METHODS, tmp_path_factory.mktemp("allowed"))
+def compiled_methods(tmp_path_factory):
+    return CompiledMethods(AllowedConstructs(), METHODS, tmp_path_factory.mktemp("allowed"))
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_a_construct_behaves_as_in_python(allowed, name):
-    assert_same_as_python(allowed, Allowed(), name, PAIRS)
+def test_a_construct_behaves_as_in_python(compiled_methods, name):
+    assert_same_as_python(compiled_methods, AllowedConstructs(), name, PAIRS)

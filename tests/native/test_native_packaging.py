@@ -63,8 +63,10 @@ def test_tcc_gives_the_same_bits(tmp_path):
         binary = folder / "binaries" / "linux64" / f"{name}.so"
         subprocess.run([tcc, "-shared", "-o", binary, folder / "sources" / MAIN_SOURCE["2"], "-lm"], check=True)
         for kind in ("CoSimulation", "ModelExchange"):
-            ours, theirs = (simulate_fmu(path, fmi_type=kind, stop_time=1.0).tobytes() for path in (fmu, folder))
-            assert ours == theirs, (name, kind)
+            results, tcc_results = (
+                simulate_fmu(path, fmi_type=kind, stop_time=1.0).tobytes() for path in (fmu, folder)
+            )
+            assert results == tcc_results, (name, kind)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -78,8 +80,8 @@ def test_the_sources_compile_without_warnings(name, fmi, tmp_path):
             (tmp_path / file.split("/")[-1]).write_bytes(content)
     assert [option for option in STRICT if option.startswith("-Wno-")] == ["-Wno-strict-prototypes"]
     options = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fsyntax-only")
-    done = subprocess.run([compiler(), *options, MAIN_SOURCE[fmi]], cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
+    result = subprocess.run([compiler(), *options, MAIN_SOURCE[fmi]], cwd=tmp_path, capture_output=True, text=True)
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -125,7 +127,7 @@ def test_fmpy_simulates_a_native_fmu_to_the_same_digits(fmus, name):
 
 
 def test_the_archive_contents_are_complete(smd):
-    fmu, printed = smd
+    fmu, output = smd
     binaries = {f"binaries/{name}/smd{platform.suffix}" for name, platform in PLATFORMS.items()}
     assert {name for name in read_archive(fmu) if name.startswith("binaries/")} == binaries
     sources = {f"sources/{file}" for file in (*OWN_HEADERS, *FMI_HEADERS["2"], "fmi2.c", "model.h", "guid.h")}
@@ -135,7 +137,7 @@ def test_the_archive_contents_are_complete(smd):
     assert set(files) - documentation == binaries | sources | {"modelDescription.xml", "resources/model_data.json"}
     assert "documentation/licenses/license.txt" in documentation
     digest = sha256(fmu.read_bytes()).hexdigest()
-    assert printed == f"smd.fmu  {len(fmu.read_bytes()) / 1000:4.0f} kB  {digest[:16]}\n"
+    assert output == f"smd.fmu  {len(fmu.read_bytes()) / 1000:4.0f} kB  {digest[:16]}\n"
 
 
 def test_only_required_code_is_compiled():
@@ -149,10 +151,10 @@ def test_only_required_code_is_compiled():
 @pytest.mark.campaign
 def test_methods_and_laws_can_be_selected_as_for_the_python_fmu(tmp_path):
     build_native_fmus()
-    chosen = ("stickslip", "--method", "exact", "--law", "hybrid", "--platform", "linux64")
+    arguments = ("stickslip", "--method", "exact", "--law", "hybrid", "--platform", "linux64")
     for folder, kind in (("python", ()), ("native", ("--native",))):
-        done = build(*chosen, *kind, "--out", tmp_path / folder)
-        assert done.returncode == 0, done.stderr
+        result = build(*arguments, *kind, "--out", tmp_path / folder)
+        assert result.returncode == 0, result.stderr
     lean = read_archive(tmp_path / "native" / "stickslip.fmu")
     text = lean["sources/model.h"].decode()
     complete = read_archive(build_native_fmus() / "stickslip.fmu")["sources/model.h"].decode()
@@ -177,8 +179,8 @@ def binary(request, smd, lief):
     """A platform, the bytes of its binary, and every library in it, parsed."""
     fmu, _ = smd
     content = read_archive(fmu)[f"binaries/{request.param}/smd{PLATFORMS[request.param].suffix}"]
-    parsed = lief.MachO.parse(content) if request.param == "darwin64" else [lief.parse(content)]
-    return request.param, content, parsed
+    libraries = lief.MachO.parse(content) if request.param == "darwin64" else [lief.parse(content)]
+    return request.param, content, libraries
 
 
 def test_every_binary_exports_only_fmi_and_needs_only_the_system(binary):
@@ -190,10 +192,10 @@ def test_every_binary_exports_only_fmi_and_needs_only_the_system(binary):
         if platform == "win64":
             libraries_needed = {name.lower() for name in libraries_needed if not name.startswith("api-ms-win-crt-")}
         assert libraries_needed == SYSTEM[platform]
-        exported = {function.name.lstrip("_") for function in library.exported_functions}
-        assert exported - {"mh_dylib_header", "dso_handle"} == functions()
-        imported = {function.name.lstrip("_") for function in library.imported_functions}
-        assert {"sin", "cos", "exp"} <= imported  # from the system, like Python, and not from the compiler
+        exported_functions = {function.name.lstrip("_") for function in library.exported_functions}
+        assert exported_functions - {"mh_dylib_header", "dso_handle"} == functions()
+        imported_functions = {function.name.lstrip("_") for function in library.imported_functions}
+        assert {"sin", "cos", "exp"} <= imported_functions  # from the system, like Python, and not from the compiler
 
 
 def functions():
@@ -217,8 +219,8 @@ def test_macos_libraries_cover_both_processors_and_are_validly_signed(smd, lief)
         for _, _, offset, size, _ in (unpack_from(">IIIII", content, 8 + 20 * i) for i in range(count))
     )
     assert [unpack_from("<I", library, 4)[0] for library in (intel, arm)] == [0x01000007, 0x0100000C]
-    parsed = lief.MachO.parse(arm)  # which owns the objects taken from it
-    check_signature(arm, parsed.at(0).code_signature.data_offset)
+    fat_binary = lief.MachO.parse(arm)  # which owns the objects taken from it
+    check_signature(arm, fat_binary.at(0).code_signature.data_offset)
 
 
 def check_signature(library, signature_offset):
@@ -295,8 +297,8 @@ def test_the_build_description_names_the_existing_files(smd):
     fmu, _ = smd
     (configuration,) = read_build_description(fmu)
     assert configuration.modelIdentifier == "smd"
-    described = read_model_description(fmu).buildConfigurations[0]
-    for item in (configuration, described):
+    description = read_model_description(fmu).buildConfigurations[0]
+    for item in (configuration, description):
         assert [file for files in item.sourceFileSets for file in files.sourceFiles] == ["fmi2.c"]
 
 
@@ -322,10 +324,10 @@ def test_a_mistake_is_reported_in_one_sentence():
         (("--native", "--platform", "amiga"), "There is no platform 'amiga'; choose from linux64, win64, darwin64"),
         (("--native", "unheard"), "There is no model 'unheard'"),
     ):
-        done = build(*arguments)
-        assert done.returncode != 0
-        assert words in done.stderr
-        assert "Traceback" not in done.stderr
+        result = build(*arguments)
+        assert result.returncode != 0
+        assert words in result.stderr
+        assert "Traceback" not in result.stderr
 
 
 def test_a_missing_compiler_error_says_what_to_install(tmp_path, monkeypatch):

@@ -83,10 +83,14 @@ def machine(request):
 
     def program(version):
         def make(folder):
-            chosen, (more, options) = PLATFORMS[request.param], PROGRAM[request.param]
-            options = [*(option.format(compiler=find_compiler()) for option in chosen.options), *options]
+            platform, (more_sources, options) = PLATFORMS[request.param], PROGRAM[request.param]
+            options = [*(option.format(compiler=find_compiler()) for option in platform.options), *options]
             options += VERSION_OPTIONS[version]
-            sources = [HOST_SOURCE, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
+            sources = [
+                HOST_SOURCE,
+                *more_sources,
+                *(Path(native.__file__).with_name(file) for file in platform.sources),
+            ]
             command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]
             subprocess.run([*command, *map(str, sources), "-o", str(folder / "host.exe")], check=True)
 
@@ -144,8 +148,8 @@ def runs(name):
 def exchange(name):
     """Return a script with Euler steps in model exchange and an event at each step; a sled starts far behind its
     driver."""
-    ref, driven = value_references(name), "x_driver" in declarations_of(name)
-    states, behind = len(model_class(name).states) + driven, [(ref["x0"], -0.2)] if driven else []
+    ref, has_driver = value_references(name), "x_driver" in declarations_of(name)
+    states, behind = len(model_class(name).states) + has_driver, [(ref["x0"], -0.2)] if has_driver else []
     reals = " ".join(str(ref[v]) for v in outputs(name) if declarations_of(name)[v].type == "Real")
     spans = [f"0 euler {states} {k / ROWS!r} {(k + 1) / ROWS!r} 40 {reals}" for k in range(ROWS)]
     return ["0 new exchange", *begin(0, behind)[1:], *spans]

@@ -167,14 +167,14 @@ def random_mistake(draw, name, stop):
     """Return an invalid setting, a step that reports it, and possibly a recovery."""
     declarations = declarations_of(name)
     odd = {v: draw.choice(ODD) for v in draw.sample(list(tunable(name)), 2)}
-    fixed = draw.choice([v for v, d in declarations.items() if d.variability == "fixed"])
-    calculated = draw.choice([v for v, d in declarations.items() if d.causality in ("output", "local")])
+    fixed_variable = draw.choice([v for v, d in declarations.items() if d.variability == "fixed"])
+    calculated_variable = draw.choice([v for v, d in declarations.items() if d.causality in ("output", "local")])
     mistake = draw.choice(
         [
             ("set", odd),
             ("set", odd),
-            ("set", {fixed: 1 if declarations[fixed].items else 0.125}),
-            ("set", {calculated: 0.125 if declarations[calculated].type == "Real" else 1}),
+            ("set", {fixed_variable: 1 if declarations[fixed_variable].items else 0.125}),
+            ("set", {calculated_variable: 0.125 if declarations[calculated_variable].type == "Real" else 1}),
             ("wrong_step", draw.choice([0.1, -0.1, nan, 1e-3]), draw.choice([0.01, -0.01, 0.0, nan, inf])),
             ("step", draw.choice([0.0, -stop, inf])),
         ]

@@ -39,10 +39,10 @@ class Draw:
     def truth(self, depth):
         a, b = self.number(depth), self.number(0)
         shapes = ["{a} < {b}", "{a} >= {b}", "not {a} == {b}", "{i} > i", "self.on", "{a} <= {b} < 2.0"]
-        one = self.draw.choice(shapes).format(a=a, b=b, i=self.integer())
+        test = self.draw.choice(shapes).format(a=a, b=b, i=self.integer())
         if depth == 0 or self.draw.random() < 0.5:
-            return one
-        return f"({one} {self.draw.choice(['and', 'or'])} {self.truth(depth - 1)})"
+            return test
+        return f"({test} {self.draw.choice(['and', 'or'])} {self.truth(depth - 1)})"
 
     def block(self, depth, indent, loop=False):
         lines = [line for _ in range(self.draw.randint(1, 4)) for line in self.statement(depth)]
@@ -93,14 +93,15 @@ class Draw:
 def test_random_programs_behave_as_in_python(tmp_path):
     names = [f"random_{seed}" for seed in range(48)]
     text = "import math\n"
-    text += "from tests.native.test_language_subset import THIRD, Allowed, half\n\n\nclass Random(Allowed):\n"
+    text += "from tests.native.test_language_subset import THIRD, AllowedConstructs, half\n\n\n"
+    text += "class Random(AllowedConstructs):\n"
     (tmp_path / "random_programs.py").write_text(text + "\n".join(Draw(name).method(name) for name in names))
     spec = importlib.util.spec_from_file_location("random_programs", tmp_path / "random_programs.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    frozen, draw = (
+    compiled_methods, draw = (
         CompiledMethods(module.Random(), names, tmp_path, warnings=[]),
         random.Random(2),
     )  # they make little sense
     for name in names:
-        assert_same_as_python(frozen, module.Random(), name, draw.sample(PAIRS, 60))
+        assert_same_as_python(compiled_methods, module.Random(), name, draw.sample(PAIRS, 60))

@@ -30,9 +30,9 @@ def program(source, fmu, sanitizers=SANITIZERS):
 
     def run(*words, **options):
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": SANITIZER_ENVIRONMENT} | options
-        done = subprocess.run([str(out), *map(str, words)], timeout=900, **streams)
-        assert done.returncode == 0, f"{done.returncode}: {done.stdout[-300:]} {(done.stderr or b'')[-3000:]}"
-        return done.stdout, done.stderr
+        result = subprocess.run([str(out), *map(str, words)], timeout=900, **streams)
+        assert result.returncode == 0, f"{result.returncode}: {result.stdout[-300:]} {(result.stderr or b'')[-3000:]}"
+        return result.stdout, result.stderr
 
     return run
 
@@ -138,18 +138,18 @@ def test_any_name_is_logged_as_utf8_and_never_as_a_format(abuse):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is Linux's")
-@pytest.mark.parametrize("lost", ["closed", "full", "unread", "by the host", "not writable"])
-def test_an_error_survives_the_loss_of_standard_error(abuse, lost):
+@pytest.mark.parametrize("loss", ["closed", "full", "unread", "by the host", "not writable"])
+def test_an_error_survives_the_loss_of_standard_error(abuse, loss):
     """The signal of a pipe without reader would end a host that does not ignore it, such as this one."""
-    if lost == "closed":
+    if loss == "closed":
         abuse("check_failures", preexec_fn=lambda: os.close(2), stderr=None)
-    elif lost == "full":
+    elif loss == "full":
         with open("/dev/full", "w") as full:
             abuse("check_failures", stderr=full)
-    elif lost == "not writable":
+    elif loss == "not writable":
         with open(os.devnull) as null:
             abuse("check_failures", stderr=null)
-    elif lost == "unread":
+    elif loss == "unread":
         reader, writer = os.pipe()
         os.close(reader)
         abuse("check_failures", stderr=writer)

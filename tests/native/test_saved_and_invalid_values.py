@@ -29,16 +29,16 @@ int main(void)
 
 
 @pytest.fixture(scope="module")
-def unpacked(tmp_path_factory):
+def unpacked_fmu(tmp_path_factory):
     path = build_native_fmus() / "smd.fmu"
     folder = str(fmpy.extract(path, tmp_path_factory.mktemp("smd")))
     return fmpy.read_model_description(path), folder
 
 
 @pytest.fixture
-def fmu(unpacked):
+def fmu(unpacked_fmu):
     """An initialised instance."""
-    description, folder = unpacked
+    description, folder = unpacked_fmu
     fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="smd", instanceName="smd")
     fmu.instantiate()
     fmu.setupExperiment(stopTime=1.0)
@@ -59,9 +59,9 @@ def checksum(content):
 
 
 @pytest.mark.parametrize("exponent", [-1017, -921, -808])
-def test_a_power_of_two_has_as_few_digits_as_in_python(unpacked, fmu, capfd, exponent):
+def test_a_power_of_two_has_as_few_digits_as_in_python(unpacked_fmu, fmu, capfd, exponent):
     """The nearest decimal of 16 digits does not read back, but the next one does."""
-    (mass,) = (v.valueReference for v in unpacked[0].modelVariables if v.name == "m")
+    (mass,) = (v.valueReference for v in unpacked_fmu[0].modelVariables if v.name == "m")
     with pytest.raises(FMICallException, match="fmi2SetReal failed with status 3"):
         fmu.setReal([mass], [-(2.0**exponent)])
     assert f"m = {-(2.0**exponent)!r} kg is refused" in capfd.readouterr().err
@@ -81,8 +81,8 @@ def test_values_do_not_depend_on_the_order_in_which_a_call_reads_them(name):
     assert rows[0] == rows[1]
 
 
-def test_no_value_of_a_refused_call_is_set(unpacked, fmu, capfd):
-    references = [v.valueReference for v in unpacked[0].modelVariables if v.name in ("k", "c", "m")]
+def test_no_value_of_a_refused_call_is_set(unpacked_fmu, fmu, capfd):
+    references = [v.valueReference for v in unpacked_fmu[0].modelVariables if v.name in ("k", "c", "m")]
     before = fmu.getReal(references)
     for i in range(3):
         values = [7.0, 7.0, 7.0]
@@ -99,15 +99,15 @@ def test_a_saved_state_with_a_boolean_of_2_is_refused_though_its_checksum_is_rig
         archive.extractall(tmp_path, [name for name in archive.namelist() if name.startswith("sources/")])
     (tmp_path / "sources" / "places.c").write_text(PLACES)
     subprocess.run([compiler(), "-o", "places", "places.c", "-lm"], cwd=tmp_path / "sources", check=True)
-    printed = subprocess.run([tmp_path / "sources" / "places"], capture_output=True, text=True, check=True).stdout
+    output = subprocess.run([tmp_path / "sources" / "places"], capture_output=True, text=True, check=True).stdout
     state = fmu.getFMUstate()
     content = string_at(state.value, len(fmu.serializeFMUstate(state)))
     assert checksum(content[CHECKSUM_SIZE:]).to_bytes(8, "little") == content[:CHECKSUM_SIZE]
-    assert printed
-    for offset in map(int, printed.split()):
-        changed = content[CHECKSUM_SIZE:offset] + b"\2" + content[offset + 1 :]
+    assert output
+    for offset in map(int, output.split()):
+        changed_content = content[CHECKSUM_SIZE:offset] + b"\2" + content[offset + 1 :]
         with pytest.raises(FMICallException):
-            fmu.deSerializeFMUstate(pack("<Q", checksum(changed)) + changed)
+            fmu.deSerializeFMUstate(pack("<Q", checksum(changed_content)) + changed_content)
     assert "a saved state is refused" in capfd.readouterr().err
     fmu.freeFMUstate(state)
 
@@ -119,8 +119,8 @@ def test_a_saved_state_with_a_boolean_of_2_is_refused_though_its_checksum_is_rig
         *((True, ["logStatusFatal"], False), (False, [], False), (False, ["logStatusError"], False)),
     ],
 )
-def test_errors_are_logged_in_their_categories_only(unpacked, capfd, logging_on, categories, is_logged):
-    description, folder = unpacked
+def test_errors_are_logged_in_their_categories_only(unpacked_fmu, capfd, logging_on, categories, is_logged):
+    description, folder = unpacked_fmu
     lines = []
     fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="smd", instanceName="smd")
     callbacks = fmpy.fmi2.fmi2CallbackFunctions()

@@ -10,19 +10,19 @@ from fmus.compiler.c.call_graph import CallGraph
 from fmus.compiler.c.struct_layout import AttributeTypeError
 from fmus.compiler.syntax_trees import TranslationError
 from fmus.packaging.native.native_fmu import collect_sources
-from tests.native.test_language_subset import THIRD, Allowed, Part, half
+from tests.native.test_language_subset import THIRD, AllowedConstructs, Part, half
 
 
 def with_default(x, y=1.0):
     return x + y
 
 
-def nothing(part):
+def count_call(part):
     part.count()
 
 
-def again(x):
-    return again(x)
+def recurse(x):
+    return recurse(x)
 
 
 def exception_caught(self, x, y):
@@ -161,11 +161,11 @@ def several_passed_on(self, x, y):
 
 
 def nothing_used(self, x, y):
-    return x + nothing(self.left)
+    return x + count_call(self.left)
 
 
 def recursion(self, x, y):
-    return again(x)
+    return recurse(x)
 
 
 def element_outside(self, x, y):
@@ -185,19 +185,19 @@ def constants_that_fail(self, x, y):
     return x + 1.0 / (THIRD - THIRD)
 
 
-FORBIDDEN = [
+FORBIDDEN_CONSTRUCTS = [
     f
     for f in list(vars().values())
     if getattr(f, "__code__", None) and f.__code__.co_varnames[:3] == ("self", "x", "y")
 ]
 
 
-@pytest.mark.parametrize("function", FORBIDDEN, ids=lambda function: function.__name__)
+@pytest.mark.parametrize("function", FORBIDDEN_CONSTRUCTS, ids=lambda function: function.__name__)
 def test_an_unsupported_construct_is_refused_with_its_line(function):
     with pytest.raises(
         TranslationError, match=r"^test_unsupported_constructs\.py:\d+: '.*' cannot be translated"
     ) as refusal:
-        CallGraph(Allowed()).add_model_entry_point("entry", function, FLOAT, FLOAT)
+        CallGraph(AllowedConstructs()).add_model_entry_point("entry", function, FLOAT, FLOAT)
     line = int(str(refusal.value).split(":")[1])
     assert 0 <= line - function.__code__.co_firstlineno < 8 or function.__name__ == "recursion"
 
@@ -206,16 +206,16 @@ def owner(**attributes):
     return type("Owner", (), {"__init__": lambda self: vars(self).update(attributes)})()
 
 
-SHARED, OTHER = Part(), Part()
-OTHER.extra = 1.0
+SHARED_PART, OTHER_PART = Part(), Part()
+OTHER_PART.extra = 1.0
 
 
 @pytest.mark.parametrize(
     ("part", "path"),
     [
         *((owner(a=value), "Owner.a") for value in (None, "text", [], [1.0, 2], (1.0,), math.sin)),
-        (owner(p=SHARED, q=SHARED), "Owner.q"),
-        (owner(p=Part(), q=OTHER), "Owner.q"),
+        (owner(p=SHARED_PART, q=SHARED_PART), "Owner.q"),
+        (owner(p=Part(), q=OTHER_PART), "Owner.q"),
         (owner(long=1.0), "Owner.long"),
     ],
 )
