@@ -6,7 +6,7 @@ M, K, MU_S, MU_D, G, DRIVER = 12.5, 742.5, 0.9, 0.6, 9.81, 0.034  # the sled, SI
 HOLD, SLIDE = MU_S * M * G, MU_D * M * G
 BREAKAWAY_TIME = HOLD / (K * DRIVER)
 DRY = [name for name in MODELS if "mode" in outputs(name)]
-DRIVEN = [name for name in MODELS if "x_driver" in outputs(name)]
+DRIVEN_MODELS = [name for name in MODELS if "x_driver" in outputs(name)]
 ERROR = 3
 
 

@@ -55,12 +55,12 @@ def model(request, tmp_path):
 def choices(name, description):
     """Return every combination of law and load, by reference; the method is unused but must match the law."""
     by_name = {variable.name: variable for variable in description.modelVariables}
-    names = [one for one in ("friction", "pin_load") if one in by_name]
-    items = [[int(item.value) for item in by_name[one].declaredType.items] for one in names]
+    names = [choice for choice in ("friction", "pin_load") if choice in by_name]
+    items = [[int(item.value) for item in by_name[choice].declaredType.items] for choice in names]
     for values in product(*items):
         yield {
-            by_name[one].valueReference: value
-            for one, value in zip((*names, "solver.method"), (*values, RODAS), strict=True)
+            by_name[choice].valueReference: value
+            for choice, value in zip((*names, "solver.method"), (*values, RODAS), strict=True)
         }
 
 
@@ -85,8 +85,8 @@ def test_directional_derivatives_agree_with_central_differences(model):
         fmu.setReal(pushes, list(point[size:]))
         return np.array(fmu.getReal(unknowns))
 
-    for chosen in choices(name, description):
-        begin(fmu, chosen)
+    for choice_values in choices(name, description):
+        begin(fmu, choice_values)
         settle(fmu)
         for i in range(POINTS):
             speed = (0.3, -0.2, 0.0)[i % 3] if model_class(name).contacts else (0.3, -0.2, 0.05)[i % 3]
@@ -98,7 +98,7 @@ def test_directional_derivatives_agree_with_central_differences(model):
             if (
                 speed == 0.0
                 and fmu.getReal([states[1].valueReference])[0] == 0.0
-                and 1 not in list(chosen.values())[:1]
+                and 1 not in list(choice_values.values())[:1]
             ):
                 continue  # a law that depends on the sign of the speed has a kink there
             pairs = []

@@ -13,29 +13,29 @@ from models import MODELS, declarations_of, model_class, outputs, push
 
 from harness.references.certified_reference import load_reference
 
-COUNTED = [name for name in MODELS if "mode" in outputs(name)]
+MODELS_WITH_MODES = [name for name in MODELS if "mode" in outputs(name)]
 BREAKAWAY_TIME = 0.9 * 12.5 * 9.81 / (742.5 * 0.034)  # of the sled
 
 
 @pytest.fixture(scope="module")
-def unpacked(tmp_path_factory):
-    """Return unpacked(name), which gives the folder of an FMU and its description."""
+def unpack(tmp_path_factory):
+    """Return unpack(name), which gives the folder of an FMU and its description."""
     temporary_folder, folders = tmp_path_factory.mktemp("unpacked"), {}
 
-    def unpacked(name):
+    def unpack(name):
         if name not in folders:
             path = fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu"
             folder = fmpy.extract(path, temporary_folder / name)
             folders[name] = str(folder), fmpy.read_model_description(path)
         return folders[name]
 
-    return unpacked
+    return unpack
 
 
 @contextmanager
-def master(unpacked, name, values=None, **options):
+def master(unpack, name, values=None, **options):
     """Return an initialised instance, and functions that read and write its variables by name."""
-    folder, description = unpacked(name)
+    folder, description = unpack(name)
     by_name = {variable.name: variable for variable in description.modelVariables}
     fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=folder, modelIdentifier=name)
     fmu.instantiate(**options)
@@ -83,13 +83,13 @@ def through(fmu, stop, h, at_event):
 
 
 @pytest.mark.parametrize("method", ["default", "ode45"])
-@pytest.mark.parametrize("name", COUNTED)
-def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, method):
+@pytest.mark.parametrize("name", MODELS_WITH_MODES)
+def test_a_master_with_long_steps_sees_every_event_at_its_time(unpack, name, method):
     """The old mode is valid until event mode is entered, and the new one from then on."""
     true, changes = load_reference(name).events, []
     stop = model_class(name).stop_time
     values = {} if method == "default" else {"solver.method": 3, "solver.rtol": 1e-10}
-    with master(unpacked, name, values, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
+    with master(unpack, name, values, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
         fmu.updateDiscreteStates()
         fmu.enterStepMode()
 
@@ -103,12 +103,12 @@ def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, m
 
         through(fmu, stop, 1.0, at_event)
     assert [mode for _, mode in changes] == [mode for _, mode in true]
-    off = max(abs(t - then) for (t, _), (then, _) in zip(changes, true, strict=True))
+    off = max(abs(t - true_time) for (t, _), (true_time, _) in zip(changes, true, strict=True))
     assert off < (1e-12 if name == "stickslip" and method == "default" else 1e-6)
 
 
-def test_the_sled_breaks_away_at_the_closed_form_time(unpacked):
-    with master(unpacked, "stickslip", eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
+def test_the_sled_breaks_away_at_the_closed_form_time(unpack):
+    with master(unpack, "stickslip", eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
         fmu.updateDiscreteStates()
         fmu.enterStepMode()
         *_, early, t_end = fmu.doStep(0.0, 16.0)
@@ -120,9 +120,9 @@ def test_the_sled_breaks_away_at_the_closed_form_time(unpacked):
         assert read("F_friction") == pytest.approx(0.6 * 12.5 * 9.81, rel=1e-14)
 
 
-def test_a_refused_end_of_initialisation_can_be_repeated(unpacked, capfd):
+def test_a_refused_end_of_initialisation_can_be_repeated(unpack, capfd):
     """Then the run begins in event mode, as without the refused call."""
-    folder, description = unpacked("stickslip")
+    folder, description = unpack("stickslip")
     (sliding,) = (v.valueReference for v in description.modelVariables if v.name == "mu_d")
     fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=folder, modelIdentifier="stickslip")
     fmu.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
@@ -144,20 +144,20 @@ def test_a_refused_end_of_initialisation_can_be_repeated(unpacked, capfd):
 
 @pytest.mark.parametrize("options", [{}, {"eventModeUsed": True}, {"earlyReturnAllowed": True}], ids=str)
 @pytest.mark.parametrize("name", MODELS)
-def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpacked, name, options):
+def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpack, name, options):
     """To the last bit, whether events are handled inside a step, at its end, or after an early return."""
     stop, rows = model_class(name).stop_time, []
-    for chosen in ({}, options):
-        with master(unpacked, name, **chosen) as (fmu, read, _):
-            if chosen.get("eventModeUsed"):
+    for arguments in ({}, options):
+        with master(unpack, name, **arguments) as (fmu, read, _):
+            if arguments.get("eventModeUsed"):
                 fmu.updateDiscreteStates()
                 fmu.enterStepMode()
             t, row = 0.0, []
             for i in range(1, 33):
                 while t < i * stop / 32:
                     event, _, early, t = fmu.doStep(t, i * stop / 32 - t)
-                    assert event <= bool(chosen.get("eventModeUsed"))
-                    assert early <= bool(chosen.get("earlyReturnAllowed"))
+                    assert event <= bool(arguments.get("eventModeUsed"))
+                    assert early <= bool(arguments.get("earlyReturnAllowed"))
                     if event:
                         handle(fmu)
                 row.append([read(variable) for variable in outputs(name)])
@@ -167,10 +167,10 @@ def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpacked, name, o
 
 @pytest.mark.parametrize("early", [True, False])
 @pytest.mark.parametrize("name", MODELS)
-def test_discrete_variables_change_in_event_mode_only_and_every_event_is_announced(unpacked, name, early):
+def test_discrete_variables_change_in_event_mode_only_and_every_event_is_announced(unpack, name, early):
     """Modes, counts and the time of the last event; where no early return is allowed, a step passes many events."""
-    discrete = [v.name for v in unpacked(name)[1].modelVariables if v.variability == "discrete"]
-    stop, rows, announced = model_class(name).stop_time, [], 0
+    discrete = [v.name for v in unpack(name)[1].modelVariables if v.variability == "discrete"]
+    stop, rows, n_announced = model_class(name).stop_time, [], 0
 
     def read_all():
         return [read(variable) for variable in discrete]
@@ -179,7 +179,7 @@ def test_discrete_variables_change_in_event_mode_only_and_every_event_is_announc
         rows.append(read_all())
 
     options = {"eventModeUsed": True, "earlyReturnAllowed": early, "intermediateUpdate": update}
-    with master(unpacked, name, **options) as (fmu, read, _):
+    with master(unpack, name, **options) as (fmu, read, _):
         fmu.updateDiscreteStates()
         fmu.enterStepMode()
         t = 0.0
@@ -189,23 +189,23 @@ def test_discrete_variables_change_in_event_mode_only_and_every_event_is_announc
             event, _, _, t = fmu.doStep(t, min(t + 0.25 * stop, stop) - t)
             assert all(row == before for row in [*rows, read_all()])
             assert rows
-            announced += event
+            n_announced += event
             handle(fmu)
             if "mode" in discrete:
                 assert event == (read("events.count") > before[discrete.index("events.count")])
             assert read("solver.steps") >= before[discrete.index("solver.steps")]
-    assert (announced > 0) == (name in COUNTED)
+    assert (n_announced > 0) == (name in MODELS_WITH_MODES)
 
 
-@pytest.mark.parametrize("name", COUNTED)
-def test_discrete_variables_do_not_change_in_intermediate_updates(unpacked, name):
+@pytest.mark.parametrize("name", MODELS_WITH_MODES)
+def test_discrete_variables_do_not_change_in_intermediate_updates(unpack, name):
     """Without event mode they change at communication points."""
     rows, stop = [], model_class(name).stop_time
 
     def update(*_):
         rows.append([read("mode"), read("events.count"), read("solver.steps")])
 
-    with master(unpacked, name, intermediateUpdate=update) as (fmu, read, _):
+    with master(unpack, name, intermediateUpdate=update) as (fmu, read, _):
         before = [read("mode"), read("events.count"), read("solver.steps")]
         fmu.doStep(0.0, stop)
         assert len(rows) > 2
@@ -216,26 +216,26 @@ def test_discrete_variables_do_not_change_in_intermediate_updates(unpacked, name
 
 @pytest.mark.parametrize("early", [True, False])
 @pytest.mark.parametrize("name", MODELS)
-def test_intermediate_update_shows_every_internal_step_and_can_stop_anywhere(unpacked, name, early):
-    stop, rows, began, requested = 0.5 * model_class(name).stop_time, [], 0.0, 0.3 * model_class(name).stop_time
-    reference = next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == outputs(name)[0])
+def test_intermediate_update_shows_every_internal_step_and_can_stop_anywhere(unpack, name, early):
+    stop, rows, began, requested_time = 0.5 * model_class(name).stop_time, [], 0.0, 0.3 * model_class(name).stop_time
+    reference = next(v.valueReference for v in unpack(name)[1].modelVariables if v.name == outputs(name)[0])
 
-    def update(_, time, setting, getting, finished, may_return, request, when):
+    def update(_, time, setting, getting, step_finished, may_return, request, when):
         rows.append((time, fmu.getFloat64([reference])[0]))
         assert (setting, getting, may_return) == (True, True, early)
-        assert finished == (time > began)
-        request[0], when[0] = True, requested
+        assert step_finished == (time > began)
+        request[0], when[0] = True, requested_time
 
-    with master(unpacked, name, earlyReturnAllowed=early, intermediateUpdate=update) as (fmu, read, _):
+    with master(unpack, name, earlyReturnAllowed=early, intermediateUpdate=update) as (fmu, read, _):
         t = 0.0
-        while t < requested:  # an event is an early return as well
+        while t < requested_time:  # an event is an early return as well
             began = t
-            _, _, returned, t = fmu.doStep(t, stop - t)
-            assert returned == early
-        assert t == (pytest.approx(requested, abs=1e-12) if early else stop)
+            _, _, early_return, t = fmu.doStep(t, stop - t)
+            assert early_return == early
+        assert t == (pytest.approx(requested_time, abs=1e-12) if early else stop)
         assert rows[-1] == (t, read(outputs(name)[0]))
         steps = read("solver.steps")
-    with master(unpacked, name) as (fmu, read, _):
+    with master(unpack, name) as (fmu, read, _):
         times = [time for time, _ in rows]
         assert times == sorted(times)
         for time, x in rows:
@@ -246,11 +246,11 @@ def test_intermediate_update_shows_every_internal_step_and_can_stop_anywhere(unp
     assert len(rows) > (0 if early else steps)
 
 
-def test_a_value_set_at_an_event_acts_from_then_on(unpacked):
+def test_a_value_set_at_an_event_acts_from_then_on(unpack):
     """A push at breakaway acts as if it were set between two steps at the same time."""
     rows = []
     for event_mode in (True, False):
-        with master(unpacked, "stickslip", eventModeUsed=event_mode, earlyReturnAllowed=True) as (fmu, read, write):
+        with master(unpack, "stickslip", eventModeUsed=event_mode, earlyReturnAllowed=True) as (fmu, read, write):
             if event_mode:
                 fmu.updateDiscreteStates()
                 fmu.enterStepMode()
@@ -268,13 +268,13 @@ def test_a_value_set_at_an_event_acts_from_then_on(unpacked):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_an_input_set_during_intermediate_update_acts_from_then_on(unpacked, name):
+def test_an_input_set_during_intermediate_update_acts_from_then_on(unpack, name):
     """It acts as if it were set between two steps at the same time. Only inputs can be set there."""
     (force, size), stop = push(name), 0.5 * model_class(name).stop_time
-    references = {v.name: v.valueReference for v in unpacked(name)[1].modelVariables}
+    references = {v.name: v.valueReference for v in unpack(name)[1].modelVariables}
     rows, set_times = [], []
 
-    def update(_, time, setting, getting, finished, may_return, request, when):
+    def update(_, time, setting, getting, step_finished, may_return, request, when):
         if time > 0.3 * stop and not set_times:
             set_times.append(time)
             fmu.setFloat64([references[force]], [size])
@@ -282,7 +282,7 @@ def test_an_input_set_during_intermediate_update_acts_from_then_on(unpacked, nam
                 fmu.setFloat64([references["m"]], [1.0])
 
     for options in {"intermediateUpdate": update}, {}:
-        with master(unpacked, name, {"solver.method": 3}, **options) as (fmu, read, write):
+        with master(unpack, name, {"solver.method": 3}, **options) as (fmu, read, write):
             t = 0.0
             if set_times:
                 (t,) = set_times
@@ -293,9 +293,9 @@ def test_an_input_set_during_intermediate_update_acts_from_then_on(unpacked, nam
     assert rows[0] == rows[1]
 
 
-@pytest.mark.parametrize("name", COUNTED)
-def test_a_pending_event_survives_save_and_restore(unpacked, name):
-    with master(unpacked, name, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
+@pytest.mark.parametrize("name", MODELS_WITH_MODES)
+def test_a_pending_event_survives_save_and_restore(unpack, name):
+    with master(unpack, name, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
         fmu.updateDiscreteStates()
         fmu.enterStepMode()
         *_, t = fmu.doStep(0.0, model_class(name).stop_time)

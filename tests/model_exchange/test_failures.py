@@ -8,7 +8,7 @@ from worker_client import FmiError
 
 from fmus.compiler.lowering import model_exchange_run
 from fmus.runtime.codes import DIVERGED, OK
-from tests.model_exchange.model_exchange_client import DRIVEN, handle_event_at, single_error
+from tests.model_exchange.model_exchange_client import DRIVEN_MODELS, handle_event_at, single_error
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
@@ -72,7 +72,7 @@ def bad_settings(name):
     yield {force: nan}, f"{force} = nan"
     yield {"m": 0.0}, "m = 0.0"
     yield {f"{x}0": 0.5}, "fixed"
-    if name in DRIVEN:
+    if name in DRIVEN_MODELS:
         yield {"mu_d": 2.0}, "mu_d"
 
 

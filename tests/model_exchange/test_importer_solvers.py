@@ -28,10 +28,10 @@ from harness.references.certified_reference import POINTS, event_time_error, loa
 from harness.references.models import CASES
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
-CERTIFIED = [name for name in MODELS if (ROOT / "fmus" / f"{name}.csv").is_file()]
-TRUTHS = {name: load_reference(name) for name in CERTIFIED}
+CERTIFIED_MODELS = [name for name in MODELS if (ROOT / "fmus" / f"{name}.csv").is_file()]
+TRUTHS = {name: load_reference(name) for name in CERTIFIED_MODELS}
 PEAK, FASTEST, DRIVER = 2.9546, 0.41736, 0.034  # acceleration, speed, driver speed of the slipping sled, SI
-GROWTH = dict.fromkeys(CERTIFIED, 1.0) | dict.fromkeys(("stickslip", "pacejka"), PEAK / DRIVER * 0.544 / FASTEST)
+GROWTH = dict.fromkeys(CERTIFIED_MODELS, 1.0) | dict.fromkeys(("stickslip", "pacejka"), PEAK / DRIVER * 0.544 / FASTEST)
 EVENTS = ("events.count", "events.t_last")
 
 
@@ -64,7 +64,7 @@ def bound(name, evaluations, rtol):
 # ---- accuracy
 
 
-@pytest.fixture(scope="module", params=CERTIFIED)
+@pytest.fixture(scope="module", params=CERTIFIED_MODELS)
 def runs(request, fmus, _workers):
     """The name of a model, and its default experiment by CVode as (tolerance, columns, evaluations)."""
     path = fmus / f"{request.param}.fmu"
@@ -108,10 +108,10 @@ def test_a_stuck_mass_does_not_move_under_cvode(runs):
         pytest.skip(f"{name} has no dry friction")
     for _, columns, _ in table:
         rows = zip(*(columns[v] for v in (*outputs(name)[:2], "mode", "events.count")), strict=True)
-        stuck = [(count, x, v) for x, v, mode, count in rows if mode == 0]
-        assert len(stuck) > 10 or name == "coulomb"
-        assert all(v == 0.0 for _, _, v in stuck)
-        assert len({x for _, x, _ in stuck}) == len({count for count, _, _ in stuck})
+        stuck_rows = [(count, x, v) for x, v, mode, count in rows if mode == 0]
+        assert len(stuck_rows) > 10 or name == "coulomb"
+        assert all(v == 0.0 for _, _, v in stuck_rows)
+        assert len({x for _, x, _ in stuck_rows}) == len({count for count, _, _ in stuck_rows})
 
 
 def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
@@ -120,13 +120,13 @@ def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
     name, table = runs
     rtol, columns, evaluations = table[-1]
     interval = model_class(name).stop_time / (POINTS - 1)
-    solved = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
+    co_simulation_columns = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
     for variable in outputs(name):
         if declarations_of(name)[variable].type == "Real":
-            actual, expected = (np.array(table[variable])[:, None] for table in (columns, solved))
+            actual, expected = (np.array(table[variable])[:, None] for table in (columns, co_simulation_columns))
             assert relative_errors(actual, expected).max() <= 20.0 * bound(name, evaluations, rtol) + 1e-6, variable
         else:
-            assert columns[variable] == solved[variable]
+            assert columns[variable] == co_simulation_columns[variable]
 
 
 @pytest.mark.parametrize("name", slow_after(1, ["stickslip", "pacejka"]))
@@ -311,7 +311,7 @@ def test_ties_under_cvode_are_decided_by_physics(worker, fmus, name, values, sto
 
 
 def test_an_invalid_parameter_ends_the_run_before_it_begins(worker, fmus):
-    for name in CERTIFIED:
+    for name in CERTIFIED_MODELS:
         with pytest.raises(FmpyError, match="fmi3SetFloat64 failed with status 3"):
             exchange(worker, fmus / f"{name}.fmu", name, start_values={"m": -1.0})
         (line,) = worker.read_stderr().splitlines()
@@ -319,7 +319,7 @@ def test_an_invalid_parameter_ends_the_run_before_it_begins(worker, fmus):
 
 
 def test_a_successful_run_logs_nothing(worker, fmus):
-    for name in CERTIFIED:
+    for name in CERTIFIED_MODELS:
         exchange(worker, fmus / f"{name}.fmu", name)
     assert worker.read_stderr() == ""
 

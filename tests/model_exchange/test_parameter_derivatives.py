@@ -116,16 +116,18 @@ def central_differences(fmu, unknowns, known, value, handle_change):
     return result
 
 
-def check_derivatives(fmu, unknowns, declared, reals, fixed_at, handle_change):
+def check_derivatives(fmu, unknowns, dependencies, reals, fixed_at, handle_change):
     """Compare the derivatives of the unknowns by all knowns with differences, and the zeros with what is declared.
 
-    `declared` has the knowns of each unknown, and `fixed_at` the knowns that cannot change here in both directions.
+    `dependencies` has the knowns of each unknown, and `fixed_at` the knowns that cannot change here in both directions.
     """
     slopes = {}
     scale = np.abs(np.array(fmu.getReal(unknowns))) + 1e-3
     for known, value in reals.items():
         slopes[known] = np.array(fmu.getDirectionalDerivative(unknowns, [known], [1.0]))
-        assert [u for u, slope in zip(unknowns, slopes[known], strict=True) if slope and known not in declared[u]] == []
+        assert [
+            u for u, slope in zip(unknowns, slopes[known], strict=True) if slope and known not in dependencies[u]
+        ] == []
         if known not in fixed_at:
             expected = central_differences(fmu, unknowns, known, value, handle_change)
             rounding = 1e-11 * scale / (H * abs(value))
@@ -143,12 +145,12 @@ def check_derivatives(fmu, unknowns, declared, reals, fixed_at, handle_change):
 
 def real_unknowns(unknowns):
     """Return the references of the Real unknowns, and those of the knowns of each."""
-    declared = {
+    dependencies = {
         u.variable.valueReference: {known.valueReference for known in u.dependencies}
         for u in unknowns
         if u.variable.type in ("Real", "Float64")
     }
-    return list(declared), declared
+    return list(dependencies), dependencies
 
 
 def references(description, *names):
@@ -163,42 +165,44 @@ def has_kink(description, choices, speed):
 
 def test_initial_unknowns_have_the_declared_derivatives_by_parameters_and_start_values(instance):
     fmu, _, description = instance
-    unknowns, declared = real_unknowns(description.initialUnknowns)
+    unknowns, dependencies = real_unknowns(description.initialUnknowns)
     speeds = references(description, "v0", "omega0")
     solver_values = [v.valueReference for v in description.modelVariables if is_known(v) and "." in v.name]
     has_responded = set()
     for choices, reals in situations(description, 3):
-        speed = next((reals[one] for one in speeds), 1.0)
+        speed = next((reals[reference] for reference in speeds), 1.0)
         if has_kink(description, choices, speed):
             continue
         enter_initialization(fmu, choices, reals)
         at_rest = {*speeds} if speed == 0.0 else set()
-        jacobian = check_derivatives(fmu, unknowns, declared, reals, at_rest, lambda: None)
+        jacobian = check_derivatives(fmu, unknowns, dependencies, reals, at_rest, lambda: None)
         has_responded |= {(unknowns[i], list(reals)[j]) for i, j in zip(*np.nonzero(jacobian), strict=True)}
         assert not any(fmu.getDirectionalDerivative(unknowns, solver_values, [1.0] * len(solver_values)))
     start_values = references(description, "x0", "theta0", "m", "m_1")
-    assert has_responded >= {(u, known) for u in unknowns for known in start_values if known in declared[u]}
+    assert has_responded >= {(u, known) for u in unknowns for known in start_values if known in dependencies[u]}
 
 
 def test_outputs_have_the_declared_derivatives_by_parameters_after_initialisation(instance):
     """In event mode and at communication points. FMI 2.0 declares dependencies on states and inputs only."""
     fmu, interface, description = instance
     derivatives = [u for u in description.derivatives if u.variable.causality != "output"]
-    unknowns, declared = real_unknowns([*description.outputs, *derivatives])
+    unknowns, dependencies = real_unknowns([*description.outputs, *derivatives])
     starts = [v.valueReference for v in description.modelVariables if v.variability == "fixed"]
     if "2.0" in interface:
-        declared = dict.fromkeys(unknowns, references(description, *(v.name for v in description.modelVariables)))
+        dependencies = dict.fromkeys(unknowns, references(description, *(v.name for v in description.modelVariables)))
     masses = references(description, "m", "m_1")
-    accelerations = [one for one in unknowns if one in references(description, "a", "alpha", "a_1")]
+    accelerations = [reference for reference in unknowns if reference in references(description, "a", "alpha", "a_1")]
     slopes = []
     for choices, reals in situations(description, 3):
-        if has_kink(description, choices, next((reals[one] for one in starts if reals.get(one) == 0.0), 1.0)):
+        if has_kink(
+            description, choices, next((reals[reference] for reference in starts if reals.get(reference) == 0.0), 1.0)
+        ):
             continue
         enter_initialization(fmu, choices, reals)
         fmu.exitInitializationMode()
         if interface.endswith("CS"):
             fmu.doStep(0.0, 1e-3)
-        jacobian = check_derivatives(fmu, unknowns, declared, reals, starts, lambda: None)
+        jacobian = check_derivatives(fmu, unknowns, dependencies, reals, starts, lambda: None)
         for number, known in enumerate(reals):
             assert known not in starts or not jacobian[:, number].any()
         slopes += fmu.getDirectionalDerivative(accelerations, masses, [1.0])
@@ -259,18 +263,18 @@ def test_derivatives_of_constants_are_calculated_once_until_a_parameter_changes(
     for instance, static in ((fmu, 0.9), (other, 1.0)):
         instance.instantiate()
         begin(instance, static)
-    first, changed = slopes(fmu), slopes(other)
-    assert (calls.value, first != changed) == (2 * len(knowns), True)
+    first, changed_slopes = slopes(fmu), slopes(other)
+    assert (calls.value, first != changed_slopes) == (2 * len(knowns), True)
     for value in (1.0, 0.0):
         fmu.setReal(force, [value])
-        again = slopes(fmu), slopes(other), calls.value
-    assert again == (first, changed, 2 * len(knowns))
-    saved = fmu.getFMUState()
+        last_results = slopes(fmu), slopes(other), calls.value
+    assert last_results == (first, changed_slopes, 2 * len(knowns))
+    state = fmu.getFMUState()
     fmu.setReal(mu_s, [1.0])
-    assert (slopes(fmu), calls.value) == (changed, 3 * len(knowns))
-    fmu.setFMUState(saved)
+    assert (slopes(fmu), calls.value) == (changed_slopes, 3 * len(knowns))
+    fmu.setFMUState(state)
     begin(other, 0.9)
     assert (slopes(fmu), slopes(other)) == (first, first)
-    fmu.freeFMUState(saved)
+    fmu.freeFMUState(state)
     for instance in (fmu, other):
         instance.freeInstance()

@@ -141,8 +141,8 @@ def test_derivatives_of_the_time_of_rest_are_those_of_the_closed_form(puck, F_x,
     values = {"m": 1.3, "mu": 2.0, "v_x0": 0.3, "v_y0": 1.0, "F_x": F_x, "F_y": F_y}
     run = harness.sensitivity(puck, list(values), {"alpha": 0.0, "g": 1.0, "mu_s": 2.0} | values, stop=2.0)
 
-    def time(**changed):
-        m, mu, v_x, v_y, F_x, F_y = (values | changed).values()
+    def time(**changes):
+        m, mu, v_x, v_y, F_x, F_y = (values | changes).values()
         return m * (mu * m * mpmath.hypot(v_x, v_y) + F_x * v_x + F_y * v_y) / ((mu * m) ** 2 - F_x**2 - F_y**2)
 
     (event,) = run.events
@@ -165,8 +165,8 @@ def test_derivatives_through_stick_and_slip_are_those_of_differences(seed, tmp_p
     for name in names:
         h, ends = 1e-4 * values[name], []
         for n in (-2, -1, 1, 2):
-            moved = harness.simulate(fmu, values | {name: values[name] + n * h}, stop=4.0, rtol=1e-11)
-            ends.append((moved["x"][-1], moved["y"][-1]))
+            changed_run = harness.simulate(fmu, values | {name: values[name] + n * h}, stop=4.0, rtol=1e-11)
+            ends.append((changed_run["x"][-1], changed_run["y"][-1]))
         exact = [(a - 8.0 * b + 8.0 * c - d) / (12.0 * h) for a, b, c, d in zip(*ends, strict=True)]
         actual = [run[output, name][-1] for output in ("x", "y")]
         assert actual == pytest.approx(exact, rel=1e-5, abs=1e-5 * max(map(abs, exact))), name
@@ -186,14 +186,16 @@ def test_derivatives_of_two_bodies_are_those_of_differences_and_turn_with_the_pl
     values, outputs = {"f": 2.0, "k": 30.0, "c": 0.3, "v_x0": 1.0}, ["x", "y", "z_x", "z_y"]
     run = harness.sensitivity(pair, list(values), values, stop=1.0, outputs=outputs)
     turned_values = {"f": 2.0, "k": 30.0, "c": 0.3, "v_y0": 1.0}
-    turned = harness.sensitivity(pair, list(turned_values), turned_values | {"v_x0": -0.3}, stop=1.0, outputs=outputs)
+    turned_run = harness.sensitivity(
+        pair, list(turned_values), turned_values | {"v_x0": -0.3}, stop=1.0, outputs=outputs
+    )
     for name, turned_name in zip(values, turned_values, strict=True):
-        assert run["x", name].tolist() == turned["y", turned_name].tolist()
-        assert run["z_y", name].tolist() == (-turned["z_x", turned_name]).tolist()
+        assert run["x", name].tolist() == turned_run["y", turned_name].tolist()
+        assert run["z_y", name].tolist() == (-turned_run["z_x", turned_name]).tolist()
         h, ends = 1e-4 * values[name], []
         for n in (-2, -1, 1, 2):
-            moved = harness.simulate(pair, values | {name: values[name] + n * h}, stop=1.0, rtol=1e-11)
-            ends.append([*moved.events.t[1:], *(moved[output][-1] for output in outputs)])
+            changed_run = harness.simulate(pair, values | {name: values[name] + n * h}, stop=1.0, rtol=1e-11)
+            ends.append([*changed_run.events.t[1:], *(changed_run[output][-1] for output in outputs)])
         exact = [(a - 8.0 * b + 8.0 * c - d) / (12.0 * h) for a, b, c, d in zip(*ends, strict=True)]
         times = [event.derivatives[name] for event in run.events]
         assert [*times, *(run[output, name][-1] for output in outputs)] == pytest.approx(exact, rel=1e-5, abs=1e-6), (

@@ -6,7 +6,7 @@ from models import MODELS, counts, declarations_of, each_case, model_class, outp
 from row_comparison import assert_identical
 from worker_client import FmiError
 
-from tests.model_exchange.model_exchange_client import DRIVEN, DRIVER, DRY, K, handle_event_at, single_error
+from tests.model_exchange.model_exchange_client import DRIVEN_MODELS, DRIVER, DRY, K, handle_event_at, single_error
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
@@ -16,11 +16,11 @@ def test_the_states_are_position_speed_and_the_driver(launch, name):
     fmu = launch(name)
     assert fmu.update_discrete_states() == []
     x, v = outputs(name)[:2]
-    assert fmu.sizes() == [2 + (name in DRIVEN), 2 * (name in DRY)]
+    assert fmu.sizes() == [2 + (name in DRIVEN_MODELS), 2 * (name in DRY)]
     assert fmu.get_states() == [
         declarations_of(name)[f"{x}0"].start,
         declarations_of(name)[f"{v}0"].start,
-        *([0.0] * (name in DRIVEN)),
+        *([0.0] * (name in DRIVEN_MODELS)),
     ]
     assert fmu.nominals() == [1e-3] * fmu.sizes()[0]  # as solver.atol, in SI units
 
@@ -97,13 +97,13 @@ def test_rates_outputs_and_indicators_depend_only_on_the_set_states(launch_movin
         assert values[:3] == [scale * t, *point[:2]]
         assert values[3] == pytest.approx(rates[1], rel=1e-13)
         assert rates[0] == point[1]
-        assert rates[2:] == [DRIVER] * (name in DRIVEN)
+        assert rates[2:] == [DRIVER] * (name in DRIVEN_MODELS)
         assert fmu.get_states() == point
         if name in DRY:
             assert fmu.indicators() == [abs(point[1]), 1.0]
         result = rates, fmu.indicators(), fmu.get(*outputs(name))
         assert results.setdefault(scale, result) == result
-        if name in DRIVEN:
+        if name in DRIVEN_MODELS:
             assert fmu.get("x_driver") == point[2]
             assert fmu.get("F_spring") == pytest.approx(K * (point[2] - point[0]), rel=1e-14)
 

@@ -35,7 +35,7 @@ from fmus.compiler.units import unit_of
 
 # Numbers with a physical dimension, to check that equations are consistent with their units.
 BASES = ("kg", "m", "s", "A", "K")
-ANY = (0.0, math.inf)  # zero and infinity match every dimension
+ANY_DIMENSION = (0.0, math.inf)  # zero and infinity match every dimension
 
 
 class DimensionError(AssertionError):
@@ -65,7 +65,7 @@ class Quantity:
     def like(self, other, operation):
         """Return the value of `other`, which must have the same dimension."""
         if not isinstance(other, Quantity):
-            if abs(other) not in ANY and any(self.powers):
+            if abs(other) not in ANY_DIMENSION and any(self.powers):
                 raise DimensionError(f"{operation.__name__} of {self!r} and the number {other!r}")
             return other
         if self.powers != other.powers:
@@ -73,10 +73,10 @@ class Quantity:
         return other.value
 
 
-def _same(operation, swapped=False, answer=lambda value, powers: Quantity(value, *powers)):
+def _same_dimension(operation, is_swapped=False, answer=lambda value, powers: Quantity(value, *powers)):
     def method(self, other):
         pair = (self.value, self.like(other, operation))
-        return answer(operation(*(reversed(pair) if swapped else pair)), self.powers)
+        return answer(operation(*(reversed(pair) if is_swapped else pair)), self.powers)
 
     return method
 
@@ -91,14 +91,14 @@ def _product(operation, sign):
     return method
 
 
-Quantity.__add__ = Quantity.__radd__ = _same(operator.add)
-Quantity.__sub__, Quantity.__rsub__ = _same(operator.sub), _same(operator.sub, swapped=True)
+Quantity.__add__ = Quantity.__radd__ = _same_dimension(operator.add)
+Quantity.__sub__, Quantity.__rsub__ = _same_dimension(operator.sub), _same_dimension(operator.sub, is_swapped=True)
 Quantity.__mul__ = Quantity.__rmul__ = _product(operator.mul, 1)
 Quantity.__truediv__ = _product(operator.truediv, -1)
 Quantity.__rtruediv__ = lambda self, other: other and Quantity(other / self.value, *(-power for power in self.powers))
 Quantity.__neg__ = lambda self: Quantity(-self.value, *self.powers)
 for _name in ("lt", "le", "gt", "ge", "eq"):
-    setattr(Quantity, f"__{_name}__", _same(getattr(operator, _name), answer=lambda value, powers: value))
+    setattr(Quantity, f"__{_name}__", _same_dimension(getattr(operator, _name), answer=lambda value, powers: value))
 
 
 def _sqrt(x):
@@ -131,9 +131,9 @@ def patch_functions(monkeypatch):
     """Make the emitted models and their runtime use math functions that accept quantities."""
     for name, module in list(sys.modules.items()):
         if name.startswith("lowered_"):
-            for function, taught in FUNCTIONS.items():
+            for function, quantity_function in FUNCTIONS.items():
                 if getattr(module, function, None) is getattr(math, function):
-                    monkeypatch.setattr(module, function, taught)
+                    monkeypatch.setattr(module, function, quantity_function)
 
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
@@ -403,11 +403,11 @@ def test_every_variable_is_readable_in_every_phase(worker, fmus, name):
     fmu.begin({"m": 1e-300, push(name)[0]: 1e300})  # valid values, but the run diverges
     with pytest.raises(FmiError):
         fmu.step(0.0, 0.1)
-    failed = numbers(fmu, name)
-    calculated = [
+    failed_values = numbers(fmu, name)
+    calculated_variables = [
         v for v, d in declarations_of(name).items() if d.type == "Real" and d.causality in ("output", "local")
     ]
-    assert [v for v in calculated if not isnan(failed[v])] == []
+    assert [v for v in calculated_variables if not isnan(failed_values[v])] == []
     fmu.free()
 
 
@@ -426,7 +426,7 @@ def test_start_values_are_read_back_bit_for_bit(worker, fmus, description, name)
     fmu.free()
 
 
-def another(declaration):
+def find_other_value(declaration):
     """Return a valid value other than the start value."""
     if declaration.items:
         return next((value for _, value, _ in declaration.items if value != declaration.start), declaration.start)
@@ -443,7 +443,7 @@ def test_every_settable_variable_can_be_set_individually(launch, name):
     for variable, d in declarations_of(name).items():
         if d.causality not in ("parameter", "input") or len(d.items) == 1:
             continue
-        value = another(d)
+        value = find_other_value(d)
         choices = {"solver.method": 2} if variable == "friction" else {}
         if name == "stickslip" and variable == "mu_d":
             choices = {"mu_s": 1.0}
@@ -476,7 +476,7 @@ def test_outputs_depend_on_the_input_as_declared(launch, description, name):
         inputs = [scalar.get("name") for scalar in knowns if scalar.get("causality") == "input"]
         assert inputs in ([], [entry])
         declared_dependencies[names[int(unknown.get("index")) - 1]] = bool(inputs)
-    followed = set()
+    responding_outputs = set()
     for case in CASES:
         if case[0] != name:
             continue
@@ -487,15 +487,15 @@ def test_outputs_depend_on_the_input_as_declared(launch, description, name):
             for value in (0.1 * size, -3.0 * size, 3.0 * size):
                 fmu.set({entry: value})
                 after = fmu.get(*declared_dependencies)
-                changed = {
+                changed_outputs = {
                     v for v, a, b in zip(declared_dependencies, before, after, strict=True) if repr(a) != repr(b)
                 }
-                assert not [v for v in changed if not declared_dependencies[v]], label(case)
-                followed |= changed
+                assert not [v for v in changed_outputs if not declared_dependencies[v]], label(case)
+                responding_outputs |= changed_outputs
             fmu.set({entry: 0.0})
             assert repr(fmu.get(*declared_dependencies)) == repr(before)
             fmu.step(t, case[2] / 8)
-    assert followed == {v for v, direct in declared_dependencies.items() if direct}
+    assert responding_outputs == {v for v, direct in declared_dependencies.items() if direct}
 
 
 @EVERY_MODEL

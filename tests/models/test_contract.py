@@ -26,7 +26,7 @@ TUNABLE = {
         "r": 0.25 * INCH,
     },
 }
-FIXED = {
+FIXED_VALUES = {
     "smd": {"x0": 0.1, "v0": 0.0},
     "coulomb": {"x0": 0.1, "v0": 0.0},
     "stickslip": {"x0": 0.0, "v0": 0.0},
@@ -70,7 +70,7 @@ def test_parameters_and_inputs_have_their_names_and_defaults(name):
     assert starts(name, lambda d: (d.causality, d.variability) == ("parameter", "tunable")) == pytest.approx(
         TUNABLE[name], rel=1e-15
     )
-    assert starts(name, lambda d: d.variability == "fixed") == pytest.approx(FIXED[name], rel=1e-15)
+    assert starts(name, lambda d: d.variability == "fixed") == pytest.approx(FIXED_VALUES[name], rel=1e-15)
     force = "T_ext" if name == "pendulum" else "F_ext"
     assert starts(name, lambda d: d.causality == "input") == {force: 0.0}
     assert model_class(name).stop_time == STOP[name]

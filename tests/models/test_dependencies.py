@@ -47,7 +47,7 @@ def at_the_start(fmus):
     )
 
 
-def some(name, variable, draw):
+def draw_value(name, variable, draw):
     """Return a valid value."""
     d = declarations_of(name)[variable]
     if d.items:
@@ -61,7 +61,7 @@ def some(name, variable, draw):
 
 def situation(name, knowns, draw):
     """Return a value for each known; half of the situations are bodies at rest close to breakaway."""
-    values = {v: some(name, v, draw) for v in knowns}
+    values = {v: draw_value(name, v, draw) for v in knowns}
     model, (x, v, *_), (entry, _) = model_class(name)(), outputs(name), push(name)
     if model.rests_when_stuck and f"{v}0" in values and draw.random() < 0.5:
         values[f"{v}0"] = 0.0
@@ -82,7 +82,9 @@ def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start
     fmu = worker.instantiate(fmus / f"{name}.fmu")
     for _ in range(SITUATIONS):
         values = situation(name, knowns, draw)
-        before, *rows = fmu.vary_each(values, {v: some(name, v, draw) for v in knowns}, list(declared_dependencies))
+        before, *rows = fmu.vary_each(
+            values, {v: draw_value(name, v, draw) for v in knowns}, list(declared_dependencies)
+        )
         for v, after in zip(knowns, rows, strict=True):
             if all(map(isfinite, before + after)):  # otherwise the values are inconsistent
                 for output, old, new in zip(declared_dependencies, before, after, strict=True):
@@ -100,9 +102,13 @@ def test_fmi3_outputs_depend_on_exactly_the_declared_parameters_after_initialisa
     fmu.instantiate()
     names, references = list(declarations_of(name)), {v: i for i, v in enumerate(declarations_of(name))}
     knowns = [v for v, d in declarations_of(name).items() if d.causality in ("parameter", "input")]
-    changed = [v for v in knowns if declarations_of(name)[v].variability != "fixed"]
+    tunable_knowns = [v for v in knowns if declarations_of(name)[v].variability != "fixed"]
     declared_dependencies = {
-        v: {names[one] for one in (k.valueReference for k in unknown.dependencies) if names[one] in changed}
+        v: {
+            names[reference]
+            for reference in (k.valueReference for k in unknown.dependencies)
+            if names[reference] in tunable_knowns
+        }
         for unknown in description.outputs
         for v in [unknown.variable.name]
     }
@@ -121,9 +127,9 @@ def test_fmi3_outputs_depend_on_exactly_the_declared_parameters_after_initialisa
             continue  # the values are inconsistent
         fmu.exitInitializationMode()
         state = fmu.getFMUstate()
-        for v in changed:
+        for v in tunable_knowns:
             fmu.setFMUstate(state)
-            fmu.setReal([references[v]], [some(name, v, draw)])
+            fmu.setReal([references[v]], [draw_value(name, v, draw)])
             after = [*fmu.getReal(reals), *fmu.getInteger(modes)]
             if all(map(isfinite, after)):
                 for output, old, new in zip([*reals, *modes], before, after, strict=True):
@@ -160,8 +166,8 @@ def test_fmi3_declares_the_same_and_the_driver_depends_on_its_speed(at_the_start
 def test_rare_dependencies_are_declared_too(tmp_path):
     """A stop beyond the start; a logarithm behind a condition that is false there."""
     text = (ROOT / "tests" / "example_models" / "bumper.py").read_text(encoding="utf-8")
-    more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
-    (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")
+    output_line = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
+    (tmp_path / "bumper.py").write_text(text + output_line, encoding="utf-8")
     model = lowered_model(tmp_path / "bumper.py")
     dependencies = output_dependencies(model, declared_variables(model), at_start=True)
     assert {"gap", "s"} <= set(dependencies["a"])

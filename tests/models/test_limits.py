@@ -16,7 +16,7 @@ def force_free_values(name):
 
 
 SMOOTH = [case for case in FEW_CASES if case[1]["solver.method"] != EXACT and case[0] in BODIES]
-DRIVEN = [case for case in FEW_CASES if case[1].get("pin_load") != REACTION and case[0] in BODIES]
+DRIVEN_CASES = [case for case in FEW_CASES if case[1].get("pin_load") != REACTION and case[0] in BODIES]
 
 
 @pytest.mark.parametrize("has_stop_time", [True, False], ids=["stop known", "stop unknown"])
@@ -38,7 +38,7 @@ def test_the_largest_step_is_a_tenth_of_the_run(launch, case, has_stop_time):
 
 
 @pytest.mark.parametrize("has_stop_time", [True, False], ids=["stop known", "stop unknown"])
-@pytest.mark.parametrize("case", DRIVEN, ids=label)
+@pytest.mark.parametrize("case", DRIVEN_CASES, ids=label)
 def test_a_diverging_run_is_refused_with_and_without_a_stop_time(launch, case, has_stop_time):
     name, values, _ = case
     force, _ = push(name)

@@ -27,7 +27,7 @@ LAWS = {"hyperbola": (1, event_located.Belt), "stribeck": (2, event_located.Stri
 LAWS |= {"coulomb": (3, event_located.CoulombBelt)}
 
 
-def built(name, kind="python"):
+def build_fmu(name, kind="python"):
     """Return the FMU of a model of fmus/more."""
     if kind == "python":
         return build_once("--more") / f"{name}.fmu"
@@ -68,7 +68,7 @@ def test_a_model_has_an_icon_and_a_certified_result_from_two_formulations(name):
 @pytest.mark.campaign
 @pytest.mark.parametrize(("name", "kind"), EVERY_KIND)
 def test_fmpy_validates_each_kind(name, kind):
-    assert validate_fmu(str(built(name, kind))) == []
+    assert validate_fmu(str(build_fmu(name, kind))) == []
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def test_the_default_run_reproduces_the_certified_result(worker, name):
     """Within ten times the tolerance at 1e-6, and to 1e-9 at a tight one."""
     truth = load_reference(name, MORE)
     for values, bound in (({"solver.rtol": 1e-6}, 1e-4), ({"solver.rtol": 1e-12}, 1e-9)):
-        fmu = worker.instantiate(built(name)).begin(values, stop=truth.times[-1])
+        fmu = worker.instantiate(build_fmu(name)).begin(values, stop=truth.times[-1])
         rows = fmu.run(truth.times.tolist(), states(name))
         fmu.free()
         assert relative_errors(np.array(rows), truth.states).max() < bound
@@ -88,7 +88,7 @@ def test_the_default_run_reproduces_the_certified_result(worker, name):
 def test_events_are_those_of_the_second_formulation(worker, name):
     problem = event_located.PROBLEMS[name]()
     _, truth = event_located.solve(problem, [0.0, problem.stop], "DOP853", 3e-14, 1e-17)
-    fmu = worker.instantiate(built(name)).begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=problem.stop)
+    fmu = worker.instantiate(build_fmu(name)).begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=problem.stop)
     events = follow_events(fmu, mode_names(name), problem.stop)
     fmu.free()
     assert [tuple(modes) for _, *modes in events] == [modes for _, modes in truth]
@@ -102,7 +102,7 @@ def test_the_puck_rests_when_the_closed_form_says_also_on_a_belt(worker):
     stop, down, across = plane.rest(1.0, F, f, np.hypot(slip_x, v_y), np.arctan2(slip_x, -v_y))
     for belt in (0.0, 0.171, -0.8):
         values = {"alpha": alpha, "mu": mu, "mu_s": mu, "v_belt": belt, "v_x0": slip_x + belt, "v_y0": v_y}
-        fmu = worker.instantiate(built("puck")).begin(values | {"solver.rtol": 1e-10}, stop=2.0)
+        fmu = worker.instantiate(build_fmu("puck")).begin(values | {"solver.rtol": 1e-10}, stop=2.0)
         events = follow_events(fmu, ["mode"], 2.0)
         assert events[-1] == [pytest.approx(stop, abs=1e-9), 0]
         assert fmu.get("x", "y") == pytest.approx([across + 2.0 * belt, -down], abs=1e-9)
@@ -115,7 +115,7 @@ def test_the_belt_follows_each_law(worker, law):
     number, problem = LAWS[law][0], LAWS[law][1]()
     (_, end), truth = event_located.solve(problem, [0.0, 20.0], "DOP853", 3e-14, 1e-17)
     values = {"law": number, "solver.rtol": 1e-12, "solver.method": DOP853}
-    fmu = worker.instantiate(built("belt")).begin(values, stop=20.0)
+    fmu = worker.instantiate(build_fmu("belt")).begin(values, stop=20.0)
     events = [(t, mode) for t, mode in follow_events(fmu, ["mode"], 20.0)]
     assert event_time_error(events, [(t, mode) for t, (mode,) in truth]) < 1e-10
     assert fmu.get("x", "v") == pytest.approx(end, abs=1e-10)
@@ -124,15 +124,15 @@ def test_the_belt_follows_each_law(worker, law):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "kind"), [one for one in EVERY_KIND if one.values[0] in OSCILLATORS and one.values[1] != "python"]
+    ("name", "kind"), [case for case in EVERY_KIND if case.values[0] in OSCILLATORS and case.values[1] != "python"]
 )
 def test_native_and_fmi3_agree_with_python_bit_for_bit(worker, name, kind):
     """All outputs at 101 points of the default run."""
     model = scalar_class(name)()
-    names = [exported_name(*one) for one in variables(model) if one[1].causality == "output"]
+    names = [exported_name(*variable) for variable in variables(model) if variable[1].causality == "output"]
     times = np.linspace(0.0, type(model).stop_time, 101).tolist()
     rows = []
-    for fmu in (built(name), built(name, kind)):
+    for fmu in (build_fmu(name), build_fmu(name, kind)):
         fmu = worker.instantiate(fmu).begin({}, stop=times[-1])
         rows.append(fmu.run(times, names))
         fmu.free()
@@ -143,10 +143,10 @@ def test_native_and_fmi3_agree_with_python_bit_for_bit(worker, name, kind):
 def test_commands_know_the_models_by_name(tmp_path):
     listing = commands.harness(tmp_path, "info", "--json").stdout
     assert all(f'"model": "{name}"' in listing for name in OSCILLATORS)
-    done = commands.harness(tmp_path, "run", "belt")
-    assert "no fmus/more/belt.fmu: build it with `friction-fmus build belt`" in done.stderr
+    result = commands.harness(tmp_path, "run", "belt")
+    assert "no fmus/more/belt.fmu: build it with `friction-fmus build belt`" in result.stderr
     (tmp_path / "fmus" / "more").mkdir(parents=True)
-    (tmp_path / "fmus" / "more" / "belt.fmu").write_bytes(built("belt").read_bytes())
-    done = commands.harness(tmp_path, "run", "belt")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "sticks for" in done.stdout
+    (tmp_path / "fmus" / "more" / "belt.fmu").write_bytes(build_fmu("belt").read_bytes())
+    result = commands.harness(tmp_path, "run", "belt")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "sticks for" in result.stdout

@@ -80,10 +80,10 @@ def test_a_linear_speed_is_followed_exactly_at_any_communication_step(worker, ba
         assert np.abs(rows[:, :2] - expected).max() < 1e-9
         assert fmu.get("events.count") == len(events)
         assert fmu.get("events.t_last") == pytest.approx(events[-1][0], abs=1e-9)
-        stuck = rows[:, 2] == 0
-        assert stuck.sum() >= 3
-        x, v, _, a, force = rows[stuck].T
-        assert np.array_equal(v, [belt_rising(t)[1] for t, is_stuck in zip(times, stuck, strict=True) if is_stuck])
+        stuck_rows = rows[:, 2] == 0
+        assert stuck_rows.sum() >= 3
+        x, v, _, a, force = rows[stuck_rows].T
+        assert np.array_equal(v, [belt_rising(t)[1] for t, is_stuck in zip(times, stuck_rows, strict=True) if is_stuck])
         assert np.abs(a - 0.1).max() < 1e-14
         assert np.abs(force + 60.0 * x + 2.0 * 0.1).max() < 1e-13
         fmu.free()
@@ -206,14 +206,14 @@ def test_a_table_with_the_rates_drives_the_block_as_the_belt_does(backend, inter
     fmu, values = build(BLOCK, backend), RISING | {"v0": belt_rising(0.0)[1]}
     if interface in ("CoSimulation", "ModelExchange"):
         run = harness.simulate(fmu, values, inputs=TABLE, interval=0.5, stop=5.0, interface=interface, rtol=1e-5)
-        time, found = run.time, np.stack([run["x"], run["v"]], axis=1)
+        time, states = run.time, np.stack([run["x"], run["v"]], axis=1)
     else:
         time = np.linspace(0.0, 5.0, 501)
         spec = RunSpec(fmu, ("x", "v"), values=values, inputs=TABLE, times=time, follow=False)
         with open_simulator(spec) as simulator:
-            found = simulator.prepare(spec)({"k": 60.0})
+            states = simulator.prepare(spec)({"k": 60.0})
     expected = np.array([motion(t) for t in time])
-    assert np.abs(found - expected).max() < 1e-4
+    assert np.abs(states - expected).max() < 1e-4
 
 
 @pytest.mark.parametrize("at_kink", slow_after(1, [0.0, 0.05, 0.1]))
@@ -268,9 +268,9 @@ def test_model_exchange_follows_a_prescribed_motion(worker, method):
     expected = np.array([motion(t) for t in times])
     assert np.abs(np.array([x, v]).T - expected).max() < 1e-8
     assert count[-1] == len(events)
-    stuck = mode == 0
-    assert np.abs(a[stuck] - 0.1).max() < 1e-14
-    assert np.abs(force[stuck] + 60.0 * x[stuck] + 0.2).max() < 1e-12
+    stuck_rows = mode == 0
+    assert np.abs(a[stuck_rows] - 0.1).max() < 1e-14
+    assert np.abs(force[stuck_rows] + 60.0 * x[stuck_rows] + 0.2).max() < 1e-12
 
 
 @pytest.mark.parametrize("kind", ["native", "native/fmi3"])
@@ -422,11 +422,11 @@ def test_positions_in_a_slip_and_rates_that_are_expressions_are_continued(worker
         fmu.free()
 
 
-PULLED = '''\
+PULLED_BLOCK = '''\
 from fmus import Contact, Input, Mode, Model, Output, Parameter, State
 
 
-class Pulled(Model):
+class PulledBlock(Model):
     """A block on the floor, pulled by a spring whose other end moves as prescribed."""
 
     m = Parameter(1.0, "kg", "mass", above=0.0)
@@ -448,7 +448,7 @@ class Pulled(Model):
 @pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
 def test_a_load_follows_a_position_with_its_speed_and_acceleration(worker, backend):
     """The end of the spring moves as 0.01 t + 0.02 t^2 m; all inputs are set once."""
-    fmu = worker.instantiate(build(PULLED, backend, "pulled"))
+    fmu = worker.instantiate(build(PULLED_BLOCK, backend, "pulled"))
     fmu.begin(available(backend, PRECISE | {"a_end": 0.04, "v_end": 0.01}), stop=3.0)
     fmu.step(0.0, 1.0)
     assert fmu.get("x", "v", "x_end", "events.count") == [0.0, 0.0, pytest.approx(0.03, abs=1e-15), 0]
@@ -467,7 +467,7 @@ def test_a_load_follows_a_position_with_its_speed_and_acceleration(worker, backe
 def test_the_closed_form_continues_a_load_by_its_rate(worker, backend):
     """The end of the spring moves as 0.05 t m; methods with steps agree with the closed form."""
     a_end = '    a_end = Input(0.0, "m/s2", "acceleration of the end of the spring")\n'
-    text, rows = PULLED.replace(a_end, "").replace(", rate=a_end", ""), []
+    text, rows = PULLED_BLOCK.replace(a_end, "").replace(", rate=a_end", ""), []
     for method in ("exact", "dop853"):
         fmu = worker.instantiate(build(text, backend, "pulled", method))
         number = {"exact": 1, "dop853": 4}[method]
@@ -546,7 +546,7 @@ def test_the_model_description_states_what_depends_on_the_rate():
         assert validate_fmu(str(fmu)) == []
         description = read_model_description(fmu)
         outputs = {unknown.variable.name: unknown.dependencies for unknown in description.outputs}
-        names = {name: {one.name for one in dependencies} for name, dependencies in outputs.items()}
+        names = {name: {dependency.name for dependency in dependencies} for name, dependencies in outputs.items()}
         assert {"a_belt", "v_belt"} <= names["F_friction"] & names["a"] & names["mode"]
         assert "x_belt" not in names["F_friction"]
         if backend != "native/fmi3":
