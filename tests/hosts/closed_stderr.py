@@ -17,7 +17,7 @@ import worker
 from fmpy.fmi1 import FMICallException
 
 
-class Broken:
+class BrokenStream:
     """A stream whose methods raise the given exceptions."""
 
     encoding = "utf-8"
@@ -42,11 +42,11 @@ def no_reader():
 
 STDERR_FAILURES = {
     "none": lambda: setattr(sys, "stderr", None),
-    "write raises": lambda: setattr(sys, "stderr", Broken(write=RuntimeError("no"))),
-    "flush raises": lambda: setattr(sys, "stderr", Broken(flush=OSError(5, "no"))),
+    "write raises": lambda: setattr(sys, "stderr", BrokenStream(write=RuntimeError("no"))),
+    "flush raises": lambda: setattr(sys, "stderr", BrokenStream(flush=OSError(5, "no"))),
     "no methods": lambda: setattr(sys, "stderr", object()),
     "ASCII only": lambda: setattr(sys, "stderr", io.TextIOWrapper(io.BytesIO(), "ascii", "strict")),
-    "an encoding that is none": lambda: setattr(sys, "stderr", Broken(write=UnicodeError("no"))),
+    "an encoding that is none": lambda: setattr(sys, "stderr", BrokenStream(write=UnicodeError("no"))),
     "deleted": lambda: delattr(sys, "stderr"),
     # the following cannot be undone within a process
     "closed": lambda: sys.stderr.close(),

@@ -22,7 +22,7 @@ def stop(*_):
     raise Stop("enough", 3)
 
 
-def interrupted(slave, name, arguments):
+def interrupt_call(slave, name, arguments):
     """Call a method with an interrupt pending; no Python code runs between the interrupt and the call, as in the
     native layer."""
     trip, queue = ctypes.pythonapi["PyErr_SetInterrupt"], slave._get_log_queue()
@@ -50,7 +50,7 @@ def main(resources):
         slave.exit_initialization_mode()
         return slave
 
-    return {name: interrupted(new_instance(), name, arguments) for name, arguments in ENTRIES.items()}
+    return {name: interrupt_call(new_instance(), name, arguments) for name, arguments in ENTRIES.items()}
 
 
 if __name__ == "__main__":

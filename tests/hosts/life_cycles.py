@@ -126,10 +126,10 @@ def run_in_turn(fmus, number):
     Returns the number of distinct runs, the memory after a tenth of the life cycles and after all, and additions to
     sys.path.
     """
-    unpacked, before, after = [unpack(fmu) for fmu in fmus], list(sys.path), []
-    rows = {fmu: set() for fmu in unpacked}
+    unpacked_fmus, before, after = [unpack(fmu) for fmu in fmus], list(sys.path), []
+    rows = {fmu: set() for fmu in unpacked_fmus}
     for i in range(number):
-        fmu = unpacked[i % len(unpacked)]
+        fmu = unpacked_fmus[i % len(unpacked_fmus)]
         life = instantiate(fmu)
         rows[fmu].add(repr(life.begin().run()))
         life.fmu.reset()
@@ -143,10 +143,10 @@ def run_in_turn(fmus, number):
 
 def run_interleaved(fmus, number):
     """Step all instances in turn while all exist; return the number of distinct runs and the memory per instance."""
-    unpacked = [unpack(fmu) for fmu in fmus]
-    fleet = [[instantiate(fmu, str(i)).begin() for i in range(5)] for fmu in unpacked]
+    unpacked_fmus = [unpack(fmu) for fmu in fmus]
+    fleet = [[instantiate(fmu, str(i)).begin() for i in range(5)] for fmu in unpacked_fmus]
     before = memory()
-    for instances, fmu in zip(fleet, unpacked, strict=True):
+    for instances, fmu in zip(fleet, unpacked_fmus, strict=True):
         instances += [instantiate(fmu, str(i)).begin() for i in range(number)]
     per_instance = (memory() - before) / (number * len(fmus))
     rows = {}
@@ -164,10 +164,10 @@ def unpack_for_every_run(fmu, number):
     sys.path."""
     before, after = list(sys.path), []
     for i in range(number):
-        unpacked = unpack(fmu)
-        instantiate(unpacked).begin().end()
+        unpacked_fmu = unpack(fmu)
+        instantiate(unpacked_fmu).begin().end()
         describe.cache_clear()
-        rmtree(unpacked[0])
+        rmtree(unpacked_fmu[0])
         if i + 1 in (number // 10, number):
             after.append(memory())
     with open("/proc/self/maps") as maps:
@@ -177,15 +177,15 @@ def unpack_for_every_run(fmu, number):
 
 def run_in_threads(fmus, threads, turns):
     """Run life cycles of every FMU in several threads; return the number of distinct runs."""
-    unpacked = [unpack(fmu) for fmu in fmus]
-    for folder, _ in unpacked:
+    unpacked_fmus = [unpack(fmu) for fmu in fmus]
+    for folder, _ in unpacked_fmus:
         describe(folder)  # now, because the XML parser occasionally fails in two threads at once
-    rows, errors = {fmu: set() for fmu in unpacked}, []
+    rows, errors = {fmu: set() for fmu in unpacked_fmus}, []
 
     def work():
         try:
             for _ in range(turns):
-                for fmu in unpacked:
+                for fmu in unpacked_fmus:
                     life = instantiate(fmu)
                     rows[fmu].add(repr(life.begin().run()))
                     life.end()
@@ -200,9 +200,11 @@ def run_in_threads(fmus, threads, turns):
     return {"runs": [len(runs) for runs in rows.values()], "errors": errors}
 
 
-def continue_instances(instances, unpacked):
+def continue_instances(instances, unpacked_fmus):
     """Return the next step of the given instances, and a complete run of each FMU."""
-    return [life.step(TIMES[1], TIMES[2]) for life in instances], [instantiate(fmu).begin().run() for fmu in unpacked]
+    return [life.step(TIMES[1], TIMES[2]) for life in instances], [
+        instantiate(fmu).begin().run() for fmu in unpacked_fmus
+    ]
 
 
 def run_in_child(answers, *arguments):
@@ -211,8 +213,8 @@ def run_in_child(answers, *arguments):
 
 def run_in_processes(fmus, method):
     """Carry instances into two forked children, or none into a spawned one; compare the children with the parent."""
-    unpacked = [unpack(fmu) for fmu in fmus]
-    instances = [instantiate(fmu).begin() for fmu in unpacked]
+    unpacked_fmus = [unpack(fmu) for fmu in fmus]
+    instances = [instantiate(fmu).begin() for fmu in unpacked_fmus]
     for life in instances:
         life.step(TIMES[0], TIMES[1])
     if method == "spawn":
@@ -220,18 +222,19 @@ def run_in_processes(fmus, method):
     context = multiprocessing.get_context(method)
     answers = context.Queue()
     children = [
-        context.Process(target=run_in_child, args=(answers, instances, unpacked)) for _ in range(2 if instances else 1)
+        context.Process(target=run_in_child, args=(answers, instances, unpacked_fmus))
+        for _ in range(2 if instances else 1)
     ]
     for child in children:
         child.start()
     results = [answers.get(timeout=60) for _ in children]
     for child in children:
         child.join(60)
-    expected = continue_instances(instances, unpacked)
+    expected = continue_instances(instances, unpacked_fmus)
     return {"same": all(answer == expected for answer in results), "codes": [child.exitcode for child in children]}
 
 
-def run_beside_sources(root, built):
+def run_beside_sources(root, fmu_paths):
     """Run the FMUs in a host that has imported the sources and another pythonfmu; return the files of their code."""
     sys.path.insert(0, root)
     import pythonfmu
@@ -241,7 +244,7 @@ def run_beside_sources(root, built):
     assert fmus.runtime.slave.Fmi2Slave is pythonfmu.fmi2slave.Fmi2Slave
     pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # any use of it by an FMU would fail
     loaded_before = set(sys.modules)
-    rows = run_each(built)
+    rows = run_each(fmu_paths)
     new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - loaded_before}
     folders = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
     return {"rows": rows, "foreign": [file for file in new if file and file.startswith(folders)]}

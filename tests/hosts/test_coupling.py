@@ -72,9 +72,9 @@ def test_another_tool_gives_the_motion_of_the_page(folder, tool):
         pytest.skip(f"{tool} is not installed")
     environment = os.environ | {"PYTHONPATH": str(folder)}
     command = [sys.executable, f"couple_{tool}.py"]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-2:] == ["left.x 0.01141", "right.x -0.00802"]
+    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[-2:] == ["left.x 0.01141", "right.x -0.00802"]
 
 
 @pytest.mark.campaign

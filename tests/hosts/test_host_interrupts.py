@@ -51,9 +51,9 @@ def test_every_entry_point_is_protected_from_its_first_instruction(fmu, tmp_path
         archive.extractall(tmp_path)
     script = Path(__file__).with_name("interrupted_embedded.py")
     command = [python, "-I", script, tmp_path / "resources"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    answers = json.loads(done.stdout)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stderr
+    answers = json.loads(result.stdout)
     assert len(answers) >= 7
     for entry, (error, arguments, sentence) in answers.items():
         assert (error, arguments) == ("Stop", ["enough", 3]), entry

@@ -40,26 +40,26 @@ def backend(request):
 
 
 @pytest.fixture
-def built(backend, fmus):
+def fmu_paths(backend, fmus):
     """All FMUs of one backend."""
     return fmus_of(backend, fmus)
 
 
 @pytest.mark.campaign
-def test_hundreds_of_life_cycles_leave_little_memory(built, record_property):
+def test_hundreds_of_life_cycles_leave_little_memory(fmu_paths, record_property):
     """Measured: 2 kB per life cycle in Python, 0.2 kB in FMI 3.0, and no additions to sys.path."""
-    result = run_script("run_in_turn", built, 150)
+    result = run_script("run_in_turn", fmu_paths, 150)
     early, late = result["memory"]
     record_property("kB a life", (late - early) / 135)
-    assert result["runs"] == [1] * len(built)
+    assert result["runs"] == [1] * len(fmu_paths)
     assert result["path"] == []
     assert late - early < 135 * 4.0
 
 
 @pytest.mark.campaign
-def test_an_fmu_unpacked_for_every_run_is_released(built, record_property):
+def test_an_fmu_unpacked_for_every_run_is_released(fmu_paths, record_property):
     """Memory and libraries of earlier runs are released, as with simulate_fmu of fmpy."""
-    result = run_script("unpack_for_every_run", built[-1], 30)
+    result = run_script("unpack_for_every_run", fmu_paths[-1], 30)
     early, late = result["memory"]
     record_property("kB a run", (late - early) / 27)
     assert result["libraries"] <= 2
@@ -70,12 +70,12 @@ def test_an_fmu_unpacked_for_every_run_is_released(built, record_property):
 @pytest.mark.campaign
 def test_hundreds_of_instances_of_both_versions_of_fmi_coexist_in_one_process(fmus, record_property):
     """All instances exist at once and are stepped in turn, then in threads."""
-    built = fmus_of("fmi3", fmus) + fmus_of("python", fmus)  # tests/native/test_c_host.py has native ones
-    result = run_script("run_interleaved", built, 20)
+    fmu_paths = fmus_of("fmi3", fmus) + fmus_of("python", fmus)  # tests/native/test_c_host.py has native ones
+    result = run_script("run_interleaved", fmu_paths, 20)
     record_property("kB an instance", result["each"])
     assert result["runs"] == 1
     assert result["each"] < 90.0  # of which fmpy uses 45
-    assert run_script("run_in_threads", built, 8, 2) == {"runs": [1] * len(built), "errors": []}
+    assert run_script("run_in_threads", fmu_paths, 8, 2) == {"runs": [1] * len(fmu_paths), "errors": []}
 
 
 @pytest.mark.campaign
@@ -88,18 +88,18 @@ def test_child_processes_continue_instances_and_create_new_ones(backend, fmus, m
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("backend", ["python"])  # the others load no Python
-def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(built):
-    result = run_script("run_beside_sources", str(ROOT), built)
+def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(fmu_paths):
+    result = run_script("run_beside_sources", str(ROOT), fmu_paths)
     assert result["foreign"] == []
-    assert result["rows"] == run_script("run_each", built)
+    assert result["rows"] == run_script("run_each", fmu_paths)
 
 
-def test_a_folder_may_have_any_name(built, backend, tmp_path):
+def test_a_folder_may_have_any_name(fmu_paths, backend, tmp_path):
     """Except one with %20, which the native layer takes for a space; that of pythonfmu reads plain characters and
     spaces only."""
     names = FOLDER_NAMES[: 1 if backend == "python" else None]
     (tmp_path / "a b").mkdir()
-    expected, *results = run_script("run_in_folders", built[-1], [None, *(str(tmp_path / name) for name in names)])
+    expected, *results = run_script("run_in_folders", fmu_paths[-1], [None, *(str(tmp_path / name) for name in names)])
     assert results == [expected] * len(names)
 
 

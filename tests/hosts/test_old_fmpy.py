@@ -24,10 +24,10 @@ def test_an_old_fmpy_reads_every_fmu(fmus, tmp_path):
     subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
     python = tmp_path / "venv" / "bin" / "python"
     install = [python, "-m", "pip", "install", "-q", f"fmpy=={VERSION}"]
-    if (done := subprocess.run(install, capture_output=True, text=True)).returncode:
-        pytest.skip(f"fmpy {VERSION} cannot be installed here: {done.stderr.splitlines()[-1]}")
-    done = subprocess.run([python, "-c", SCRIPT, *files], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    version, counts = json.loads(done.stdout)
+    if (result := subprocess.run(install, capture_output=True, text=True)).returncode:
+        pytest.skip(f"fmpy {VERSION} cannot be installed here: {result.stderr.splitlines()[-1]}")
+    result = subprocess.run([python, "-c", SCRIPT, *files], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    version, counts = json.loads(result.stdout)
     assert version == VERSION
     assert min(counts) > 20

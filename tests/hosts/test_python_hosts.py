@@ -40,11 +40,11 @@ def test_the_running_code_is_the_code_in_the_fmu(fresh_worker, fmus):
 def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, tmp_path):
     """The sled is edited, rebuilt and run beside the original."""
     source = (ROOT / "fmus" / "stickslip.py").read_text()
-    edited, number = re.subn(r"(\n    k = Parameter\()[^,]+", r"\g<1>900.0", source)
+    edited_source, number = re.subn(r"(\n    k = Parameter\()[^,]+", r"\g<1>900.0", source)
     assert number == 1
-    (tmp_path / "stickslip.py").write_text(edited)
-    done = commands.build("stickslip.py", folder=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    (tmp_path / "stickslip.py").write_text(edited_source)
+    result = commands.build("stickslip.py", folder=tmp_path)
+    assert (result.returncode, result.stderr) == (0, "")
     paths = [fmus / "stickslip.fmu", tmp_path / "stickslip.fmu"]
     assert len({read_model_description(path).guid for path in paths}) == 2
     times = [0.1 * i for i in range(161)]
@@ -74,8 +74,8 @@ def test_concurrent_instances_do_not_interfere(launch, worker):
 
 def interpreter(version):
     """Return an interpreter of this version, or None."""
-    installed = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
-    return str(installed[-1]) if installed else shutil.which(f"python{version}")
+    interpreters = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
+    return str(interpreters[-1]) if interpreters else shutil.which(f"python{version}")
 
 
 def request(resources, name, values, stop):
@@ -115,7 +115,7 @@ def test_the_newest_python_translates_a_model_without_warnings():
 @pytest.fixture(scope="module")
 def requests(fmus, tmp_path_factory):
     """One run of every case on the unpacked FMUs: the request, the output names, and the rows from this Python."""
-    resources, worker, collected = tmp_path_factory.mktemp("resources"), Worker(), []
+    resources, worker, cases = tmp_path_factory.mktemp("resources"), Worker(), []
     for name in MODELS:
         with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
             archive.extractall(resources / name)
@@ -123,10 +123,10 @@ def requests(fmus, tmp_path_factory):
         name, values, stop = case
         inputs, names = request(resources, *case), [v for v in outputs(name) if declarations_of(name)[v].type == "Real"]
         fmu = worker.instantiate(fmus / f"{name}.fmu").begin(values, stop=stop)
-        collected.append((inputs, [f"{label(case)}: {v}" for v in names], fmu.run(inputs["times"], names)))
+        cases.append((inputs, [f"{label(case)}: {v}" for v in names], fmu.run(inputs["times"], names)))
         fmu.free()
     assert worker.close() == 0
-    return collected
+    return cases
 
 
 @pytest.mark.slow
@@ -140,7 +140,7 @@ def test_the_embedded_code_behaves_alike_on_the_oldest_and_newest_python(request
         [python, "-I", Path(__file__).with_name("run_embedded.py")],
         json.dumps([inputs for inputs, _, _ in requests]),
     )
-    done = subprocess.run(command, input=inputs, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    for (_, names, expected), rows in zip(requests, json.loads(done.stdout), strict=True):
+    result = subprocess.run(command, input=inputs, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    for (_, names, expected), rows in zip(requests, json.loads(result.stdout), strict=True):
         assert_close(rows, expected, names, 1e-14)

@@ -46,20 +46,20 @@ class RandomCalls(RuleBasedStateMachine):
 
     @initialize(name=st.sampled_from(MODELS))
     def instantiate(self, name):
-        self.declarations, self.outputs = declarations_of(name), outputs(name)
-        reals = {v: d for v, d in self.declarations.items() if d.type == "Real"}
-        self.calculated = [v for v, d in reals.items() if d.causality in ("output", "local")]
+        self.variables, self.outputs = declarations(name), outputs(name)
+        reals = {v: d for v, d in self.variables.items() if d.type == "Real"}
+        self.calculated_variables = [v for v, d in reals.items() if d.causality in ("output", "local")]
         if self.worker is None or not self.worker.alive:
             type(self).worker = worker_client.Worker()
         path = self.path = self.folder / f"{name}.fmu"
         self.neighbour = self.worker.instantiate(path).begin()
         self.neighbour.step(0.0, 0.1)
         self.fmu = self.worker.instantiate(path)
-        self.saved = []
-        self.anew()
+        self.saved_states = []
+        self.start_anew()
 
-    def anew(self):
-        self.phase, self.failed, self.t, self.sentences, self.changed = NEW, False, 0.0, [], False
+    def start_anew(self):
+        self.phase, self.has_failed, self.t, self.sentences, self.has_changed = NEW, False, 0.0, [], False
 
     def collect_messages(self):
         """Return the messages since the run was last healthy."""
@@ -78,9 +78,9 @@ class RandomCalls(RuleBasedStateMachine):
         assert messages, f"{function}{arguments} is refused without a sentence"
         return worker_client.FmiError
 
-    def go(self, allowed, then):
+    def go(self, allowed_phases, next_phase):
         """Set the phase after a call that FMI allows in some phases only."""
-        self.phase = then if self.phase in allowed else LOST
+        self.phase = next_phase if self.phase in allowed_phases else LOST
 
     # ---- from instantiation to the end
 
@@ -109,30 +109,32 @@ class RandomCalls(RuleBasedStateMachine):
     @rule()
     def reset(self):
         assert self.call("reset") is None
-        self.anew()
+        self.start_anew()
         self.begin()
         assert self.call("step", 0.0, 0.01) is None
         self.t = 0.01
-        self.healthy()
+        self.check_healthy()
 
     # ---- the run
 
     @rule(h=SIZES, late=st.sampled_from([0.0, 0.0, 0.0, 1.0, -1e-3, nan]))
     def step(self, h, late):
-        before = None if self.changed or self.failed or self.phase != RUNNING else self.call("get", *self.outputs)
+        before = (
+            None if self.has_changed or self.has_failed or self.phase != RUNNING else self.call("get", *self.outputs)
+        )
         answer = self.call("step", self.t + late, h)
         if answer is worker_client.FmiError:
-            failed = any(word in sentence for word in FAILURES for sentence in self.collect_messages())
-            self.failed = self.failed or (self.phase == RUNNING and failed)
-            if self.failed:
-                self.broken()
+            is_failure = any(word in sentence for word in FAILURES for sentence in self.collect_messages())
+            self.has_failed = self.has_failed or (self.phase == RUNNING and is_failure)
+            if self.has_failed:
+                self.check_failed()
             elif before is not None:
                 assert str(self.call("get", *self.outputs)) == str(before)
         else:
-            assert not self.failed
+            assert not self.has_failed
             assert h > 0.0
-            self.t, self.changed = self.t + late + h, False
-            self.healthy()
+            self.t, self.has_changed = self.t + late + h, False
+            self.check_healthy()
 
     @precondition(lambda self: self.phase == RUNNING)
     @rule(n=st.integers(1, 5))
@@ -140,45 +142,45 @@ class RandomCalls(RuleBasedStateMachine):
         for _ in range(n):
             self.step(0.1, 0.0)
 
-    def healthy(self):
-        names = [v for v in self.declarations if v != "solver.t_next"]  # which is NaN if the next step will fail
+    def check_healthy(self):
+        names = [v for v in self.variables if v != "solver.t_next"]  # which is NaN if the next step will fail
         values = dict(zip(names, self.fmu.get(*names), strict=True))
         assert [
-            v for v in names if self.declarations[v].causality in ("output", "local") and not isfinite(values[v])
+            v for v in names if self.variables[v].causality in ("output", "local") and not isfinite(values[v])
         ] == []
         self.collect_messages()
         self.sentences.clear()
 
-    def broken(self):
+    def check_failed(self):
         assert self.collect_messages()
-        assert all(isnan(value) for value in self.fmu.get(*self.calculated))
+        assert all(isnan(value) for value in self.fmu.get(*self.calculated_variables))
 
     # ---- values
 
     @rule(data=st.data())
     def write(self, data):
-        name = data.draw(st.sampled_from(sorted(self.declarations)))
-        value = data.draw(REALS if self.declarations[name].type == "Real" else INTEGERS)
+        name = data.draw(st.sampled_from(sorted(self.variables)))
+        value = data.draw(REALS if self.variables[name].type == "Real" else INTEGERS)
         if name in CHATTER and value in (1, 2, 3, 5):
-            value = self.declarations[name].start
+            value = self.variables[name].start
         self.call("set", {name: value})
-        self.changed = True
+        self.has_changed = True
 
     @rule(data=st.data())
     def read(self, data):
-        names = data.draw(st.lists(st.sampled_from(sorted(self.declarations)), min_size=2, max_size=5))
+        names = data.draw(st.lists(st.sampled_from(sorted(self.variables)), min_size=2, max_size=5))
         values = self.call("get", *names)
-        if self.failed and not self.changed and values is not worker_client.FmiError:
-            calculated = {
-                v for v, d in self.declarations.items() if d.causality in ("output", "local") and d.type == "Real"
+        if self.has_failed and not self.has_changed and values is not worker_client.FmiError:
+            calculated_variables = {
+                v for v, d in self.variables.items() if d.causality in ("output", "local") and d.type == "Real"
             }
-            assert all(isnan(value) for name, value in zip(names, values, strict=True) if name in calculated)
+            assert all(isnan(value) for name, value in zip(names, values, strict=True) if name in calculated_variables)
 
     @rule(data=st.data(), reference=STRANGE | st.integers(0, 30))
     def read_one(self, data, reference):
         """Read a variable with a wrong type, or a missing one: the others stay readable."""
         kind = data.draw(st.sampled_from(TYPES))
-        before = None if self.changed or self.phase == LOST else self.call("get", *self.outputs)
+        before = None if self.has_changed or self.phase == LOST else self.call("get", *self.outputs)
         value = self.call("read_one", kind, reference)
         if reference > 30 and value is not worker_client.FmiError:
             assert isnan(value) if kind == "Real" else not value
@@ -190,25 +192,25 @@ class RandomCalls(RuleBasedStateMachine):
     def write_one(self, data, reference):
         kind = data.draw(st.sampled_from(TYPES))
         self.call("write_one", kind, reference, VALUES.get(kind, 1))
-        self.changed = True
+        self.has_changed = True
 
     # ---- state
 
-    @precondition(lambda self: len(self.saved) < 4)
+    @precondition(lambda self: len(self.saved_states) < 4)
     @rule(through_bytes=st.booleans())
     def save(self, through_bytes):
         state = self.call("save")
         if state is not worker_client.FmiError and through_bytes:
             state = self.fmu.deserialize(self.fmu.serialize(state))  # own bytes are always accepted
         if state is not worker_client.FmiError:
-            self.saved.append((state, self.phase, self.failed, self.t, self.changed))
+            self.saved_states.append((state, self.phase, self.has_failed, self.t, self.has_changed))
 
-    @precondition(lambda self: self.saved)
+    @precondition(lambda self: self.saved_states)
     @rule(data=st.data())
     def restore(self, data):
-        state, phase, failed, t, changed = data.draw(st.sampled_from(self.saved))
+        state, phase, has_failed, t, has_changed = data.draw(st.sampled_from(self.saved_states))
         if self.call("restore", state) is None:
-            self.phase, self.failed, self.t, self.changed = phase, failed, t, changed
+            self.phase, self.has_failed, self.t, self.has_changed = phase, has_failed, t, has_changed
 
     @rule(data=st.data())
     def foreign_bytes(self, data):
@@ -219,13 +221,13 @@ class RandomCalls(RuleBasedStateMachine):
         before = self.call("get", *self.outputs)
         content = bytes.fromhex(self.fmu.serialize(state))
         position = data.draw(st.integers(0, len(content) - 1))
-        flipped = bytes(
+        flipped_content = bytes(
             [*content[:position], content[position] ^ 1 << data.draw(st.integers(0, 7)), *content[position + 1 :]]
         )
-        damaged = data.draw(
-            st.sampled_from([flipped, content[:position], content + content[:position] + b" ", b"[" * position])
+        damaged_content = data.draw(
+            st.sampled_from([flipped_content, content[:position], content + content[:position] + b" ", b"[" * position])
         )
-        assert self.call("deserialize", damaged.hex()) is worker_client.FmiError
+        assert self.call("deserialize", damaged_content.hex()) is worker_client.FmiError
         assert str(self.call("get", *self.outputs)) == str(before)
 
     def teardown(self):

@@ -66,7 +66,7 @@ def instance(backend, own_worker, fmus):
     return lambda name: own_worker.instantiate(folder / f"{name}.fmu")
 
 
-def refused(fmu, backend, function, *arguments):
+def expect_refusal(fmu, backend, function, *arguments):
     """Assert that a call is refused with one message; return it."""
     with pytest.raises(FmiError) as error:
         getattr(fmu, function)(*arguments)
@@ -144,10 +144,10 @@ def test_an_invalid_start_value_is_refused_by_name_with_the_allowed_ones(instanc
         if backend == "python":
             fmu.begin(values)
             assert all(isnan(value) for value in fmu.get(*reals))
-            sentence = refused(fmu, backend, "step", 0.0, 0.1)
+            sentence = expect_refusal(fmu, backend, "step", 0.0, 0.1)
             assert all(isnan(value) for value in fmu.get(*reals, "solver.t_next"))
         else:
-            sentence = refused(fmu, backend, "begin", values)
+            sentence = expect_refusal(fmu, backend, "begin", values)
         assert [word for word in words if word not in sentence] == [], sentence
         fmu.free()
 
@@ -165,21 +165,21 @@ def test_every_refused_call_leaves_a_run_as_it_was(instance, backend):
             for function, *arguments in wrong:
                 if backend == "python":
                     getattr(fmu, function)(*arguments)
-                    sentence = refused(fmu, backend, "step", t, 0.1)
+                    sentence = expect_refusal(fmu, backend, "step", t, 0.1)
                 else:
                     row = fmu.get(*names)
-                    sentence = refused(fmu, backend, function, *arguments)
+                    sentence = expect_refusal(fmu, backend, function, *arguments)
                     assert fmu.get(*names) == row, arguments
                 if function != "set":
                     kind, reference, *_ = arguments
                     missing = f"value reference {reference} is refused: this FMU has no such variable of type {kind}"
                     assert missing in sentence
             for offset, h in INVALID_STEPS if is_disturbed else []:
-                sentence = refused(fmu, backend, "step", t + offset, h)
+                sentence = expect_refusal(fmu, backend, "step", t + offset, h)
                 words = ("step", repr(t + offset), repr(h), f"{t!r} s", f"{STOP!r} s")
                 assert [word for word in words if word not in sentence] == [], sentence
             for function, *arguments in wrong_calls(fmu, backend) if is_disturbed else []:
-                refused(fmu, backend, function, *arguments)
+                expect_refusal(fmu, backend, function, *arguments)
             fmu.step(t, 0.25)
             rows[-1].append(fmu.get(*names))
             fmu.step(t + 0.25, {0.0: 0.05, 0.3: 0.35, 0.9: 0.85, 2.0: 1.0}[t])
@@ -191,14 +191,14 @@ def test_every_refused_call_leaves_a_run_as_it_was(instance, backend):
 
 def test_values_that_contradict_each_other_are_refused_until_one_is_corrected(instance, backend):
     other, fmu = (instance("stickslip").begin(stop=STOP) for _ in range(2))  # fmpy logs to the latter
-    for one in fmu, other:
-        one.step(0.0, 1.0)
+    for running_fmu in fmu, other:
+        running_fmu.step(0.0, 1.0)
     fmu.set({"mu_d": 1.0})
     for _ in range(2):
-        refused(fmu, backend, "step", 1.0, 0.5)
-    for one in fmu, other:
-        one.set({"mu_d": 0.5})
-        one.step(1.0, 0.5)
+        expect_refusal(fmu, backend, "step", 1.0, 0.5)
+    for running_fmu in fmu, other:
+        running_fmu.set({"mu_d": 0.5})
+        running_fmu.step(1.0, 0.5)
     assert fmu.get("x", "v", "solver.steps") == other.get("x", "v", "solver.steps")
     fmu.free()
     other.free()
@@ -209,26 +209,26 @@ def test_a_refused_start_can_be_corrected(instance, backend):
     if backend == "python":
         pytest.skip("the layer of a Python FMU refuses nothing before the first step")
     other, fmu = instance("stickslip"), instance("stickslip")  # fmpy logs to the latter
-    refused(fmu, backend, "set", {"m": -1.0})
+    expect_refusal(fmu, backend, "set", {"m": -1.0})
     fmu.setup(0.0, STOP, None)
     for start, stop in ((nan, None), (1.0, 1.0), (0.0, -1.0)):
         if backend == "native":  # the first times stay
-            refused(fmu, backend, "setup", start, stop, None)
+            expect_refusal(fmu, backend, "setup", start, stop, None)
         else:
             fmu.setup(start, stop, None)
-            refused(fmu, backend, "enter")
+            expect_refusal(fmu, backend, "enter")
     if backend == "FMI 3.0":
         fmu.setup(0.0, STOP, None)
     fmu.set({"friction": 3, "solver.method": EXACT})
     fmu.enter()
-    refused(fmu, backend, "exit")
-    refused(fmu, backend, "step", 0.0, 1.0)
+    expect_refusal(fmu, backend, "exit")
+    expect_refusal(fmu, backend, "step", 0.0, 1.0)
     fmu.set({"friction": 1})
     fmu.exit()
     other.begin(stop=STOP)
-    for one in fmu, other:
-        one.step(0.0, 1.0)
+    for running_fmu in fmu, other:
+        running_fmu.step(0.0, 1.0)
     assert fmu.get("x", "v", "solver.steps") == other.get("x", "v", "solver.steps")
-    refused(fmu, backend, "step", 1.0, STOP)
+    expect_refusal(fmu, backend, "step", 1.0, STOP)
     fmu.free()
     other.free()

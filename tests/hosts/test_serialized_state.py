@@ -36,15 +36,15 @@ def test_integers_beyond_64_bits_are_no_part_of_a_state(limit):
 def running_instance(name):
     """Return the slave class of a model, and an instance during a run."""
     slave_class = runtime(name, "slave").make_slave_class(model_class(name))
-    one = slave_class(instance_name="saved")
-    one.exit_initialization_mode()
-    assert one.do_step(0.0, 0.3)
-    return slave_class, one
+    instance = slave_class(instance_name="saved")
+    instance.exit_initialization_mode()
+    assert instance.do_step(0.0, 0.3)
+    return slave_class, instance
 
 
-def own_bytes(slave_class, one):
-    """Return the bytes of its state."""
-    return slave_class._fmu_state_to_bytes(one._get_fmu_state())
+def state_bytes(slave_class, instance):
+    """Return the bytes of the state of an instance."""
+    return slave_class._fmu_state_to_bytes(instance._get_fmu_state())
 
 
 def with_checksum(text):
@@ -77,11 +77,11 @@ def iterate_members(state, path=()):
             yield (*path, name)
 
 
-def is_alternative(one, other):
+def is_alternative(value, other):
     """Return whether two values are valid alternatives: the same type, or the same shape."""
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other)
-    return type(one) is type(other) and one != 10**30
+    if isinstance(value, list) and isinstance(other, list):
+        return len(value) == len(other)
+    return type(value) is type(other) and value != 10**30
 
 
 def find_member(state, path):
@@ -99,29 +99,36 @@ def member(content, path):
 
 @EVERY_MODEL
 def test_own_bytes_are_accepted_and_reproduced(name):
-    slave_class, one = running_instance(name)
+    slave_class, instance = running_instance(name)
     other = slave_class(instance_name="other")
     for state in ("healthy", "with an invalid value", "after a refused step", "failed"):
         if state == "with an invalid value":
-            one.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
+            instance.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
         elif state == "after a refused step":
-            assert not one.do_step(0.3, 0.1)
+            assert not instance.do_step(0.3, 0.1)
         elif state == "failed":
-            one.fail("")
-        other._set_fmu_state(slave_class._fmu_state_from_bytes(own_bytes(slave_class, one)))
-        assert own_bytes(slave_class, other) == own_bytes(slave_class, one)
+            instance.fail("")
+        other._set_fmu_state(slave_class._fmu_state_from_bytes(state_bytes(slave_class, instance)))
+        assert state_bytes(slave_class, other) == state_bytes(slave_class, instance)
 
 
 @EVERY_MODEL
 def test_flipped_truncated_or_extended_bytes_are_refused(name, capsys):
     """Ten thousand times in all."""
-    slave_class, one = running_instance(name)
-    content, draw = own_bytes(slave_class, one), random.Random(name)
+    slave_class, instance = running_instance(name)
+    content, draw = state_bytes(slave_class, instance), random.Random(name)
     for i in range(TIMES):
         position, bit = draw.randrange(len(content)), 1 << draw.randrange(8)
-        flipped = bytes([*content[:position], content[position] ^ bit, *content[position + 1 :]]) if i % 4 == 0 else b""
-        damaged = [flipped, content[:position], content + draw.randbytes(1 + i % 9), draw.randbytes(position)][i % 4]
-        assert not is_accepted(slave_class, damaged)
+        flipped_content = (
+            bytes([*content[:position], content[position] ^ bit, *content[position + 1 :]]) if i % 4 == 0 else b""
+        )
+        damaged_content = [
+            flipped_content,
+            content[:position],
+            content + draw.randbytes(1 + i % 9),
+            draw.randbytes(position),
+        ][i % 4]
+        assert not is_accepted(slave_class, damaged_content)
     stderr = capsys.readouterr().err.splitlines()
     assert set(stderr) == {f"{slave_class.__name__}: {REFUSAL}"}
     assert len(stderr) == TIMES
@@ -131,8 +138,8 @@ def test_flipped_truncated_or_extended_bytes_are_refused(name, capsys):
 def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys):
     """Each member is replaced by something invalid. Members of the same type and length are read alike, so the first
     of each gets all replacements."""
-    slave_class, one = running_instance(name)
-    content, draw = own_bytes(slave_class, one), random.Random(name)
+    slave_class, instance = running_instance(name)
+    content, draw = state_bytes(slave_class, instance), random.Random(name)
     assert is_accepted(slave_class, forge_bytes(content, lambda state: None))
     state = json.loads(content[8:])
     others, seen_kinds = [None, "1", [], {}, [0.0] * 3, True, 1, 1.5, 10**30], set()
@@ -217,24 +224,24 @@ def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
     worker, path = fmu
     times, names = [0.1 * i for i in range(len(FORGERIES) + 1)], outputs("stickslip")
     expected = worker.instantiate(path).begin().run(times, names)
-    neighbour, one = worker.instantiate(path).begin(), worker.instantiate(path).begin()
-    rows = [neighbour.get(*names)], [one.get(*names)]
+    neighbour, target = worker.instantiate(path).begin(), worker.instantiate(path).begin()
+    rows = [neighbour.get(*names)], [target.get(*names)]
     worker.read_stderr()
     for (title, forge), t, ahead in zip(FORGERIES.items(), times[:-1], times[1:], strict=True):
-        content = bytes.fromhex(one.serialize(one.save()))
-        forged = forge(content)
-        assert forged != content, title
+        content = bytes.fromhex(target.serialize(target.save()))
+        forged_content = forge(content)
+        assert forged_content != content, title
         with pytest.raises(FmiError) as refusal:
-            one.deserialize(forged.hex())
+            target.deserialize(forged_content.hex())
         assert refusal.value.status >= 3, title
         assert worker.read_stderr() == f"Stickslip: {REFUSAL}\n"
-        assert REFUSAL in one.messages()[-1][2]
-        for instance, row in zip((neighbour, one), rows, strict=True):
+        assert REFUSAL in target.messages()[-1][2]
+        for instance, row in zip((neighbour, target), rows, strict=True):
             instance.step(t, ahead - t)
             row.append(instance.get(*names))
     for row in rows:
         assert_identical(row, expected, names)
-    for instance in (neighbour, one):
+    for instance in (neighbour, target):
         instance.reset()
         assert_identical(instance.begin().run(times[:3], names), expected[:3], names)
         instance.free()
@@ -243,10 +250,10 @@ def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
 def test_forged_numbers_end_in_a_status_and_a_reset_restores_the_instance(fmu):
     """A valid checksum over random numbers, in the built FMU: it may be accepted, and the run may then fail."""
     worker, path = fmu
-    names, draw, accepted = outputs("stickslip"), random.Random(1), 0
-    one = worker.instantiate(path).begin()
-    expected = one.run([0.0, 0.1, 0.2], names)
-    content = bytes.fromhex(one.serialize(one.save()))
+    names, draw, n_accepted = outputs("stickslip"), random.Random(1), 0
+    instance = worker.instantiate(path).begin()
+    expected = instance.run([0.0, 0.1, 0.2], names)
+    content = bytes.fromhex(instance.serialize(instance.save()))
     numbers = [p for p in iterate_members(json.loads(content[8:])) if type(member(content, p)) in (int, float)]
 
     def forge(state):
@@ -257,27 +264,27 @@ def test_forged_numbers_end_in_a_status_and_a_reset_restores_the_instance(fmu):
 
     for _ in range(60):
         try:
-            one.restore(one.deserialize(forge_bytes(content, forge).hex()))
-            accepted += 1
-            one.step(0.2, 0.1)
+            instance.restore(instance.deserialize(forge_bytes(content, forge).hex()))
+            n_accepted += 1
+            instance.step(0.2, 0.1)
         except FmiError:
             pass
-        one.get(*names, "solver.t_next")
-        one.reset()
-        assert_identical(one.begin().run([0.0, 0.1, 0.2], names), expected, names)
-    assert accepted > 20
-    one.free()
+        instance.get(*names, "solver.t_next")
+        instance.reset()
+        assert_identical(instance.begin().run([0.0, 0.1, 0.2], names), expected, names)
+    assert n_accepted > 20
+    instance.free()
 
 
 def test_a_state_of_another_fmu_is_refused_and_the_instance_continues(fmu):
     worker, path = fmu
     other = worker.instantiate(path.with_name("pacejka.fmu")).begin()
-    one = worker.instantiate(path).begin()
+    instance = worker.instantiate(path).begin()
     names = outputs("stickslip")
-    before = one.get(*names)
+    before = instance.get(*names)
     with pytest.raises(FmiError):
-        one.deserialize(other.serialize(other.save()))
-    assert one.get(*names) == before
-    one.step(0.0, 0.1)
-    one.free()
+        instance.deserialize(other.serialize(other.save()))
+    assert instance.get(*names) == before
+    instance.step(0.0, 0.1)
+    instance.free()
     other.free()
