@@ -13,7 +13,7 @@ TRUTH = {"omega": 12.566, "zeta": 0.001, "r": 1e-4, "b": 0.0}
 NOISE = 2e-5  # 2e-4 of the amplitude
 
 
-def swung(seed, clock=0.0, gain=0.0):
+def fit_decay(seed, clock=0.0, gain=0.0):
     """Return the fit of a decay with an error of the clock in rad, and of the amplitude, both as random walks."""
     clean = decay_record(**TRUTH, turn=-0.1, t=T, noise=NOISE, rest=0.0, seed=seed)
     knots = np.linspace(T[0], T[-1], 9)
@@ -32,7 +32,7 @@ def errors(fit):
     ("defect", "cause"), campaign_after(1, [("clock", "a clock whose rate varies"), ("gain", "another law")])
 )
 def test_a_wander_near_the_noise_is_reported_and_covered(defect, cause):
-    fits = [swung(seed, **{defect: 2e-4}) for seed in range(4)]
+    fits = [fit_decay(seed, **{defect: 2e-4}) for seed in range(4)]
     assert sum(cause in " ".join(fit.remarks) for fit in fits) >= 3
     assert np.mean([np.array(errors(fit)) < 2 for fit in fits]) > 0.8
     assert max(max(errors(fit)) for fit in fits) < 4
@@ -40,7 +40,7 @@ def test_a_wander_near_the_noise_is_reported_and_covered(defect, cause):
 
 @pytest.mark.campaign
 def test_white_noise_is_no_wander():
-    fits = [swung(seed) for seed in range(4)]
+    fits = [fit_decay(seed) for seed in range(4)]
     assert not any("departs from the law" in " ".join(fit.remarks) for fit in fits)
 
 

@@ -43,7 +43,9 @@ def test_intervals_cover_the_true_value_at_their_level(of_each_law):
 def test_an_extra_term_never_costs_more_than_ln_n(of_each_law):
     for _, result in of_each_law:
         bic = {frozenset(law.terms): law.bic for law in result.laws}
-        for less in bic:
+        for terms in bic:
             assert all(
-                bic[more] - bic[less] < len(more - less) * np.log(len(result.t)) + 1e-6 for more in bic if less < more
+                bic[more_terms] - bic[terms] < len(more_terms - terms) * np.log(len(result.t)) + 1e-6
+                for more_terms in bic
+                if terms < more_terms
             )

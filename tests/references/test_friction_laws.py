@@ -21,7 +21,7 @@ HYBRID = {"stickslip": STICKSLIP, "belt": {"k": 0.0, "v_belt": 0.0, "F_ext": LOA
 
 
 @pytest.fixture(scope="module")
-def more():
+def more_fmus():
     """The folder of the FMUs of fmus/more."""
     return build_once("--more")
 
@@ -37,29 +37,31 @@ def hold_and_release(fmu):
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", HYBRID)
-def test_a_hybrid_law_holds_a_load_below_the_limit_for_ever(worker, fmus, more, name):
-    folder = fmus if name == "stickslip" else more
+def test_a_hybrid_law_holds_a_load_below_the_limit_for_ever(worker, fmus, more_fmus, name):
+    folder = fmus if name == "stickslip" else more_fmus
     fmu = worker.instantiate(folder / f"{name}.fmu").begin(HYBRID[name], stop=HOLD_TIME + REST)
     assert hold_and_release(fmu) == (0.0, 0.0)
     assert fmu.get("events.count") == 0
     fmu.free()
 
 
-def bristle_run(worker, more, name, **values):
-    fmu = worker.instantiate(more / f"{name}.fmu").begin(FREE | {"solver.rtol": 1e-9} | values, stop=HOLD_TIME + REST)
+def bristle_run(worker, more_fmus, name, **values):
+    fmu = worker.instantiate(more_fmus / f"{name}.fmu").begin(
+        FREE | {"solver.rtol": 1e-9} | values, stop=HOLD_TIME + REST
+    )
     loaded_position, released_position = hold_and_release(fmu)
     fmu.free()
     return loaded_position, released_position
 
 
-def test_elastoplastic_friction_deflects_elastically_and_returns(worker, more):
+def test_elastoplastic_friction_deflects_elastically_and_returns(worker, more_fmus):
     """F/sigma_0 under the load, and nothing after it (P. Dupont et al., 2002)."""
-    loaded_position, released_position = bristle_run(worker, more, "elastoplastic")
+    loaded_position, released_position = bristle_run(worker, more_fmus, "elastoplastic")
     assert loaded_position == pytest.approx(LOAD / 1e5, rel=1e-9)
     assert abs(released_position) < 1e-13
 
 
-def test_lugre_friction_keeps_a_displacement_of_a_load_below_the_limit(worker, more):
+def test_lugre_friction_keeps_a_displacement_of_a_load_below_the_limit(worker, more_fmus):
     """The drift of G. Rill, T. Schaeffer, M. Schuderer, LuGre or not LuGre, Multibody System Dynamics (2023); the value
     is that of the second formulation."""
 
@@ -73,17 +75,17 @@ def test_lugre_friction_keeps_a_displacement_of_a_load_below_the_limit(worker, m
     (*_, end), _ = event_located.solve(bristles, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
     bristles.load, bristles.start = 0.0, tuple(end)
     (*_, free), _ = event_located.solve(bristles, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
-    loaded_position, released_position = bristle_run(worker, more, "lugre")
+    loaded_position, released_position = bristle_run(worker, more_fmus, "lugre")
     assert (loaded_position, released_position) == pytest.approx((end[0], free[0]), rel=1e-6)
     assert released_position > 0.1 * LOAD / 1e5
 
 
-def test_dahl_friction_is_lugre_without_damping(worker, more):
+def test_dahl_friction_is_lugre_without_damping(worker, more_fmus):
     """z = (F_c/sigma_0) (1 - exp(-sigma_0 x/F_c)) while the mass slows down."""
     sigma_0, F_c = 2e3, 1.0
     dahl = {"sigma_0": sigma_0, "sigma_1": 0.0, "sigma_2": 0.0, "F_c": F_c, "F_s": F_c}
     values = FREE | dahl | {"F_ext": 0.0, "v0": 0.05, "solver.rtol": 1e-10}
-    fmu = worker.instantiate(more / "lugre.fmu").begin(values, stop=0.05)
+    fmu = worker.instantiate(more_fmus / "lugre.fmu").begin(values, stop=0.05)
     for x, v, z in fmu.run(np.linspace(0.0, 0.04, 21).tolist(), ["x", "v", "z"])[1:]:
         assert v > 0.0
         assert z == pytest.approx(F_c / sigma_0 * (1.0 - exp(-sigma_0 * x / F_c)), rel=1e-8)
@@ -115,11 +117,11 @@ def test_the_closed_form_without_stops_is_a_periodic_motion():
     assert [t for t, _ in events] == pytest.approx([0.5 * period * i for i in range(1, 6)], abs=1e-10)
 
 
-def test_motion_from_rest_settles_to_the_closed_form_with_stops(worker, more):
+def test_motion_from_rest_settles_to_the_closed_form_with_stops(worker, more_fmus):
     steady = steady_motion_with_stops(**STOPPING)
     values = STOPPING | {"angle0": steady.phase + 0.7, "solver.rtol": 1e-11, "solver.method": DOP853}
     stop = (20.0 * 2.0 * pi - 0.7) / STOPPING["Omega"]
-    fmu = worker.instantiate(more / "forced.fmu").begin(values, stop=stop)
+    fmu = worker.instantiate(more_fmus / "forced.fmu").begin(values, stop=stop)
     fmu.step(0.0, stop - 0.5 * steady.stop)
     assert fmu.get("mode") == 0
     assert fmu.get("x") == pytest.approx(steady.amplitude, rel=1e-10)

@@ -40,9 +40,9 @@ def test_the_sled_breaks_away_slips_and_repeats_as_stated():
     assert [mode for _, mode in motion.events] == [1, 0] * 4
     assert mp.nstr(times[0], 11) == "4.371657754"
     assert abs(times[0] - mpf(0.9) * mpf(12.5) * mpf(9.81) / (mpf(742.5) * mpf(0.034))) < mpf(10) ** -70
-    for start, end, again in zip(times[0:6:2], times[1:6:2], times[2::2], strict=True):
+    for start, end, next_start in zip(times[0:6:2], times[1:6:2], times[2::2], strict=True):
         assert mp.nstr(end - start, 12) == "0.430665996656"
-        assert mp.nstr(again - start, 13) == "3.34510449933"
+        assert mp.nstr(next_start - start, 13) == "3.34510449933"
     omega = sqrt(mpf(742.5) / mpf(12.5))
     fastest = motion.at(times[0] + (times[1] - times[0]) / 2)[1]
     assert mp.nstr(fastest, 5) == "0.41736"
