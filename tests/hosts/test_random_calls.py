@@ -46,8 +46,8 @@ class RandomCalls(RuleBasedStateMachine):
 
     @initialize(name=st.sampled_from(MODELS))
     def instantiate(self, name):
-        self.variables, self.outputs = declarations(name), outputs(name)
-        reals = {v: d for v, d in self.variables.items() if d.type == "Real"}
+        self.declarations, self.outputs = declarations_of(name), outputs(name)
+        reals = {v: d for v, d in self.declarations.items() if d.type == "Real"}
         self.calculated_variables = [v for v, d in reals.items() if d.causality in ("output", "local")]
         if self.worker is None or not self.worker.alive:
             type(self).worker = worker_client.Worker()
@@ -143,10 +143,10 @@ class RandomCalls(RuleBasedStateMachine):
             self.step(0.1, 0.0)
 
     def check_healthy(self):
-        names = [v for v in self.variables if v != "solver.t_next"]  # which is NaN if the next step will fail
+        names = [v for v in self.declarations if v != "solver.t_next"]  # which is NaN if the next step will fail
         values = dict(zip(names, self.fmu.get(*names), strict=True))
         assert [
-            v for v in names if self.variables[v].causality in ("output", "local") and not isfinite(values[v])
+            v for v in names if self.declarations[v].causality in ("output", "local") and not isfinite(values[v])
         ] == []
         self.collect_messages()
         self.sentences.clear()
@@ -159,20 +159,20 @@ class RandomCalls(RuleBasedStateMachine):
 
     @rule(data=st.data())
     def write(self, data):
-        name = data.draw(st.sampled_from(sorted(self.variables)))
-        value = data.draw(REALS if self.variables[name].type == "Real" else INTEGERS)
+        name = data.draw(st.sampled_from(sorted(self.declarations)))
+        value = data.draw(REALS if self.declarations[name].type == "Real" else INTEGERS)
         if name in CHATTER and value in (1, 2, 3, 5):
-            value = self.variables[name].start
+            value = self.declarations[name].start
         self.call("set", {name: value})
         self.has_changed = True
 
     @rule(data=st.data())
     def read(self, data):
-        names = data.draw(st.lists(st.sampled_from(sorted(self.variables)), min_size=2, max_size=5))
+        names = data.draw(st.lists(st.sampled_from(sorted(self.declarations)), min_size=2, max_size=5))
         values = self.call("get", *names)
         if self.has_failed and not self.has_changed and values is not worker_client.FmiError:
             calculated_variables = {
-                v for v, d in self.variables.items() if d.causality in ("output", "local") and d.type == "Real"
+                v for v, d in self.declarations.items() if d.causality in ("output", "local") and d.type == "Real"
             }
             assert all(isnan(value) for name, value in zip(names, values, strict=True) if name in calculated_variables)
 
