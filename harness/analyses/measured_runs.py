@@ -241,19 +241,19 @@ class OwnFmuRunner:
         if self.trajectory_measures:
             start, stop = resolve_time_span(run, description)
             run = replace(run, grid=(stop - start) / N_STEPS, follow=True)
-        to_read = [*outputs, *(FINAL_MEASURES[name][1] for name in ends)]
-        session = resources.enter_context(open_session(run, runs.varied_names, to_read))
+        read_names = [*outputs, *(FINAL_MEASURES[name][1] for name in ends)]
+        session = resources.enter_context(open_session(run, runs.varied_names, read_names))
         assert isinstance(session, Session)
         self.session = session
         self.stop = self.session.grid.stop
         self.columns = measure_columns(measures, self.variables, outputs)
-        read = [
+        column_names = [
             column.name
             for column in measure_columns(
                 ["final", *ends, "run_time", *self.trajectory_measures], self.variables, outputs
             )
         ]
-        self.order = [read.index(column.name) for column in self.columns]
+        self.order = [column_names.index(column.name) for column in self.columns]
 
     def run(self, point: Sequence[float]) -> list[float] | str:
         """Return the measures at a point of the varied values, or the error message."""
@@ -303,7 +303,7 @@ class ExternalFmuRunner:
         run = replace(runs.run, outputs=outputs, follow=True, tolerance=runs.run.rtol)
         self.session = resources.enter_context(open_session(run, runs.varied_names))
         self.columns = measure_columns(self.measures, self.variables, outputs)
-        self.parameters_used: dict[str, tuple[object, str]] = {}
+        self.effective_values: dict[str, tuple[object, str]] = {}
 
     def run(self, point: Sequence[float]) -> list[float] | str:
         start = perf_counter()
@@ -314,14 +314,14 @@ class ExternalFmuRunner:
         seconds = perf_counter() - start
         if trajectory.failure:
             return trajectory.failure
-        self.parameters_used, self.stop = effective_parameters(trajectory), float(trajectory.time[-1])
+        self.effective_values, self.stop = effective_parameters(trajectory), float(trajectory.time[-1])
         row: list[float] = []
         for name in self.measures:
             row += [seconds] if name == "run_time" else measure_outputs(name, trajectory.columns)
         return row
 
     def constants(self) -> dict[str, tuple[object, str]]:
-        return self.parameters_used
+        return self.effective_values
 
 
 Runner = OwnFmuRunner | ExternalFmuRunner

@@ -22,7 +22,7 @@ from .columns import (
 from .motion import check_samples, selection_text
 from .samples import (
     find_repeated_times,
-    find_saturated,
+    find_saturation,
     mark_dropouts,
     mark_sentinels,
     sort_times,
@@ -50,7 +50,7 @@ def mark_missing_output(values: np.ndarray, name: str) -> list[str]:
         values[:], notes = marked_values, notes + dropouts
     finite = values[np.isfinite(values)]
     for sign in (1.0, -1.0):
-        is_saturated, peaks = find_saturated(sign * finite) if len(finite) else (finite, 0)
+        is_saturated, peaks = find_saturation(sign * finite) if len(finite) else (finite, 0)
         if peaks:
             notes.append(
                 f"{name} is exactly {finite[is_saturated][0]:.6g} in {int(is_saturated.sum())} of {len(values)} "

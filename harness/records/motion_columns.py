@@ -109,17 +109,17 @@ def find_signal_column(
         order = min((part.order for part in others if part.order is not None), default=None)
     motions = [part for part in others if part.order == order]
     motions = [part for part in motions if not MAGNITUDE_NAME.search(part.name)] or motions or others
-    same_unit = [part for part in motions if part.unit == motions[0].unit]
+    unit_group = [part for part in motions if part.unit == motions[0].unit]
     unknown = [part for part in others if part.order is None and not part.unit and part not in motions]
     rivals = [*motions, *unknown]
-    if order == 0 and same_unit[0].name.lower() in ("x", "theta"):
-        return same_unit[0], describe_choice(same_unit[0], rivals, "its name is that of a position", "column")
-    if len(same_unit) == 1:
+    if order == 0 and unit_group[0].name.lower() in ("x", "theta"):
+        return unit_group[0], describe_choice(unit_group[0], rivals, "its name is that of a position", "column")
+    if len(unit_group) == 1:
         reason = "it comes first" if order is None else f"it has the name or unit of {with_article(QUANTITIES[order])}"
-        return same_unit[0], describe_choice(same_unit[0], rivals, reason, "column")
-    samples = [parse_numbers(table, part.index, strict=False) for part in same_unit]
+        return unit_group[0], describe_choice(unit_group[0], rivals, reason, "column")
+    samples = [parse_numbers(table, part.index, strict=False) for part in unit_group]
     swings = [x if np.any(np.diff(x) < 0) and np.any(np.diff(x) > 0) else np.zeros(1) for x in samples]  # no counter
-    most_varying = same_unit[int(np.argmax([np.nanstd(x) for x in swings]))]
+    most_varying = unit_group[int(np.argmax([np.nanstd(x) for x in swings]))]
     return most_varying, describe_choice(most_varying, rivals, "it varies most", "column")
 
 

@@ -147,10 +147,10 @@ def find_repeated_times(t: np.ndarray) -> tuple[np.ndarray, str]:
     if not len(times) or is_repeated.sum() > MAX_REPEATED_SHARE * len(t):
         return np.zeros(len(t), bool), ""
     times_text = ", ".join(f"{time:.6g} s" for time in times[:MAX_LISTED_TIMES])
-    more = f" and {len(times) - MAX_LISTED_TIMES} more" if len(times) > MAX_LISTED_TIMES else ""
+    ending = f" and {len(times) - MAX_LISTED_TIMES} more" if len(times) > MAX_LISTED_TIMES else ""
     verb = "occurs" if len(times) == 1 else "occur"
     return is_repeated, (
-        f"The time{'s' * (len(times) > 1)} {times_text}{more} {verb} more than once; the first sample is used, and "
+        f"The time{'s' * (len(times) > 1)} {times_text}{ending} {verb} more than once; the first sample is used, and "
         f"{int(is_repeated.sum())} of {len(t)} samples are left out."
     )
 
@@ -213,7 +213,7 @@ def leave_out_saturated(record: Motion) -> Motion:
     x = record.x
     is_saturated, levels, peaks = np.zeros(len(x), bool), [], 0
     for sign in (1.0, -1.0):
-        side, count = find_saturated(sign * x)
+        side, count = find_saturation(sign * x)
         if count:
             levels.append(f"{x[side][0]:.6g}")
             is_saturated, peaks = is_saturated | side, peaks + count
@@ -227,20 +227,20 @@ def leave_out_saturated(record: Motion) -> Motion:
     return replace(record, t=record.t[~is_saturated], x=x[~is_saturated], notes=(*record.notes, note))
 
 
-def find_saturated(x: np.ndarray) -> tuple[np.ndarray, int]:
+def find_saturation(x: np.ndarray) -> tuple[np.ndarray, int]:
     """Return a mask of the samples of x (n,) that are cut off at the largest value, and the number of their peaks.
 
     A motion that is cut off stays at its largest value in several peaks, and is rarely near it otherwise.  A motion
     that is only rounded stays nearly as long at the next lower level; one that is held before its release is at rest
     in one peak, so the longest stay does not count.
     """
-    not_saturated = np.zeros(len(x), bool), 0
+    no_saturation = np.zeros(len(x), bool), 0
     is_highest, is_low = x == x.max(), x < (x.max() + x.min()) / 2
     if not is_low.any():
-        return not_saturated
+        return no_saturation
     peak = np.cumsum(np.diff(is_low.astype(int), prepend=0) < 0)  # number of the peak; the motion is low between two
     stays = np.bincount(peak[is_highest])
     stays = np.sort(stays[stays >= MIN_STAY])[:-1]
     second = x[~is_highest].max()
     near = int(((x >= second - (x.max() - second) / 2) & ~is_highest).sum())
-    return (is_highest, len(stays) + 1) if stays.sum() > MIN_DWELL * near else not_saturated
+    return (is_highest, len(stays) + 1) if stays.sum() > MIN_DWELL * near else no_saturation

@@ -36,8 +36,8 @@ def split_heading(heading: str) -> tuple[str, str | None]:
         return parts[0], parts[2]
     bracket_match = BRACKETS.search(name)  # followed by a run, as in x (mm) Run #1
     if bracket_match and is_unit(bracket_match[1]):
-        around = name[: bracket_match.start()].rstrip(), name[bracket_match.end() :].lstrip()
-        return " ".join(filter(None, around)), bracket_match[1].strip()
+        outer_parts = name[: bracket_match.start()].rstrip(), name[bracket_match.end() :].lstrip()
+        return " ".join(filter(None, outer_parts)), bracket_match[1].strip()
     words = WORD_BOUNDARY.split(name)
     for i in range(max(len(words) - MAX_UNIT_WORDS, 1), len(words)):
         stem, suffix = " ".join(words[:i]).strip(), "/".join(words[i:]).strip()

@@ -175,9 +175,9 @@ class Oscillator:
         reals = [*dict.fromkeys((*self.states, *self.rates, *[section] * bool(self.section_variable), "solver.t_next"))]
         groups = self.states, self.rates, [section] * bool(self.section_variable)
         self.positions = [[reals.index(name) for name in group] for group in groups]
-        self.n_modes, read = len(modes), [*modes, *["events.count"] * bool(modes), *reals]
+        self.n_modes, read_names = len(modes), [*modes, *["events.count"] * bool(modes), *reals]
         self.instance = resources.enter_context(open_instance(self.spec, self.folder))
-        self.session = Session(self.instance, self.spec, (*self.varied_names, *self.initial), read)
+        self.session = Session(self.instance, self.spec, (*self.varied_names, *self.initial), read_names)
         self.signals = input_signals(self.spec, self.instance)
         self.last_equilibrium: np.ndarray | None = None
         self.set_point([self.default(name) for name in varied_names])
@@ -247,10 +247,10 @@ class Oscillator:
         """Return the error of a run that failed, with the message of the FMU."""
         return HarnessError(self.instance.log.error_message or f"{self.spec.fmu.name}: {error}")
 
-    def follow(self, y: np.ndarray, stop: float = STOP, every: float = inf) -> Iterator[Point]:
+    def follow(self, y: np.ndarray, stop: float = STOP, spacing: float = inf) -> Iterator[Point]:
         """Yield the ends of internal steps from states y until a time in s; a change of mode ends a step.
 
-        With `every`, the multiples of this time are among them. A zero of the section is one, and starts a new run.
+        With `spacing`, the multiples of this time are among them. A zero of the section is one, and starts a new run.
         """
         point, n, start = self.begin(y), 1, 0.0
         yield point
@@ -259,9 +259,9 @@ class Oscillator:
                 check_interrupt()
             if point.t >= stop:
                 return
-            n += point.t == n * every
+            n += point.t == n * spacing
             row = float(self.rows[np.searchsorted(self.rows, point.t, side="right")])
-            end = min(max(start + self.t_next, float(np.nextafter(point.t, inf))), stop, n * every, row)
+            end = min(max(start + self.t_next, float(np.nextafter(point.t, inf))), stop, n * spacing, row)
             last, point = point, self.step(point.t - start, end - start)._replace(t=end)
             if last.section < 0.0 <= point.section:
                 zero = self.locate(last, point, lambda at: at.section)
@@ -399,11 +399,11 @@ class Oscillator:
         Translations stay as they are at the start.
         """
         is_phase = (np.arange(len(self.states)) == self.phase) & self.sets_phase
-        set_by = np.column_stack([basis, np.eye(len(self.states))[:, is_phase]])
-        reduced_matrix = set_by.T @ self.matrix
-        self.inverse = np.linalg.pinv(reduced_matrix) @ set_by.T
+        directions = np.column_stack([basis, np.eye(len(self.states))[:, is_phase]])
+        reduced_matrix = directions.T @ self.matrix
+        self.inverse = np.linalg.pinv(reduced_matrix) @ directions.T
         for state, remainder in zip(
-            self.states, set_by @ (reduced_matrix @ np.linalg.pinv(reduced_matrix)) - set_by, strict=True
+            self.states, directions @ (reduced_matrix @ np.linalg.pinv(reduced_matrix)) - directions, strict=True
         ):
             if np.abs(remainder).max() > 1e-9:
                 raise self.has_no_start(state)

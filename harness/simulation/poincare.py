@@ -27,14 +27,14 @@ from .oscillator import MAX_ITERATIONS, Oscillator, Point, SteadySliding
 REPEATS = 1e-9  # relative difference of states that repeat
 SETTLED_DISTANCE = 1e-3  # of the first distance to steady sliding
 COLLAPSED_RATE = 1e-4  # share of the first rates at which an orbit has shrunk to steady sliding
-CLOSURE_ERROR = 1e-8  # the same of the ends of an orbit
+CLOSURE_ERROR = 1e-8  # relative difference of the ends of an orbit
 MAX_TURNS = 64  # without sticking
 RETURNS = (16, 48, 192)  # until a motion has repeated; after each, Newton's method is tried
 MAX_MULTIPLE = 8  # slips, or periods of the force, of the longest period
 CHUNKS = 12  # communication steps in a turn
 GRAZING = 1e-7  # relative distance from the largest amplitude of orbits that do not stick
 MAX_DOUBLINGS = 60  # of a change of speed
-BESIDE = 1e-6  # relative difference of the speed of a body that sticks at once
+SPEED_DIFFERENCE = 1e-6  # relative difference of the speed of a body that sticks at once
 JUMP = 1e-5  # growth of an amplitude at its zero that is a jump
 ROOT_RTOL = 1e-13  # relative accuracy of zeros
 SCAN_POINTS = 16  # amplitudes between which orbits that do not stick are sought
@@ -99,7 +99,7 @@ class ReturnMap:
         oscillator, period = self.oscillator, self.oscillator.forced_period
         path, returns, maxima = list[Point](), list[Point](), list[tuple[Point, Point]]()
         scale, closest = 1e-300, inf
-        for new in oscillator.follow(y, every=period or inf):
+        for new in oscillator.follow(y, spacing=period or inf):
             last = path[-1] if path else new
             path.append(new)
             scale = max(scale, float(np.abs(oscillator.reduce(new.y)).max()))
@@ -276,7 +276,7 @@ class ReturnMap:
         def reverses(change: float) -> bool:
             return oscillator.begin(y + change * oscillator.speeds).modes != modes
 
-        high, low = self.reversal, self.reversal * (1.0 - 2.0 * BESIDE)
+        high, low = self.reversal, self.reversal * (1.0 - 2.0 * SPEED_DIFFERENCE)
         for _ in range(MAX_DOUBLINGS):
             if reverses(high) or reverses(-high):
                 break
@@ -287,7 +287,7 @@ class ReturnMap:
             low, high = -low, -high
         if reverses(low):
             low = 0.0
-        while abs(high - low) > 2.0 * BESIDE * abs(high):
+        while abs(high - low) > 2.0 * SPEED_DIFFERENCE * abs(high):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if reverses(middle) else (middle, high)
         self.reversal = high

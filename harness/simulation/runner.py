@@ -104,7 +104,7 @@ def runs_in_process(spec: RunSpec) -> bool:
 
 @contextmanager
 def open_session(
-    spec: RunSpec, varied_names: Sequence[str] = (), read: Sequence[str] = ()
+    spec: RunSpec, varied_names: Sequence[str] = (), read_names: Sequence[str] = ()
 ) -> "Iterator[Session | ChildSession]":
     """Open the session of a run: in this process, or in a worker if the FMU is external.
 
@@ -113,12 +113,12 @@ def open_session(
     spec : RunSpec
     varied_names : sequence of str
         Variables whose values differ from run to run.
-    read : sequence of str
+    read_names : sequence of str
         Variables that are read at the end of runs in this process.
     """
     if runs_in_process(spec):
         with open_instance(spec) as instance:
-            yield Session(instance, spec, varied_names, read)
+            yield Session(instance, spec, varied_names, read_names)
     else:
         from .external.simulation import ChildSession
 

@@ -112,10 +112,10 @@ class SavedStateMotion:
             for item in returns:
                 item[1:] = np.minimum(item[1], new), np.maximum(item[2], new)
             if passes:
-                for number, (old, least, most) in enumerate(reversed(returns), 1):
-                    if (most - least)[self.column] <= REPEATS * (high - low)[self.column]:
+                for number, (old, lowest, highest) in enumerate(reversed(returns), 1):
+                    if (highest - lowest)[self.column] <= REPEATS * (high - low)[self.column]:
                         return 0  # it has come to rest
-                    if (np.abs(outputs - old) <= REPEATS * (most - least)).all():
+                    if (np.abs(outputs - old) <= REPEATS * (highest - lowest)).all():
                         return number
                 n_returns, return_time = n_returns + 1, t
                 if n_returns == MAX_RETURNS:

@@ -102,7 +102,7 @@ class Session:
         The run. With `exchange`, `tolerance` is that of the solver.
     varied_names : sequence of str
         Variables whose values differ from run to run.
-    read : sequence of str
+    read_names : sequence of str
         Variables that `read` returns.
 
     Attributes
@@ -119,7 +119,7 @@ class Session:
     """
 
     def __init__(
-        self, instance: FmuInstance, spec: RunSpec, varied_names: Sequence[str] = (), read: Sequence[str] = ()
+        self, instance: FmuInstance, spec: RunSpec, varied_names: Sequence[str] = (), read_names: Sequence[str] = ()
     ) -> None:
         self.instance, self.variables = instance, instance.variables
         self.grid = plan_grid(spec, instance)
@@ -135,7 +135,7 @@ class Session:
             self.step_call = instance.prepare_call(
                 "DoStep", self.grid.start, self.grid.duration, 1, *instance.step_arguments
             )
-        self.end = Recorder(instance, self.select([*dict.fromkeys(read)]), lambda row: None)
+        self.end = Recorder(instance, self.select([*dict.fromkeys(read_names)]), lambda row: None)
 
     def prepare_start(self, values: dict[str, Any], varied_names: Sequence[str]) -> None:
         """Prepare the calls that set values and initialize the instance."""
@@ -214,9 +214,11 @@ class Session:
             evaluations = exchange.solver.n_rhs
         else:
             next_step = self.recorder.cell("solver.t_next") if spec.follow else None
-            every = max(1, min(REPORT_INTERVAL, grid.whole_count // MIN_REPORTS)) if grid.h < inf else REPORT_INTERVAL
+            report_every = (
+                max(1, min(REPORT_INTERVAL, grid.whole_count // MIN_REPORTS)) if grid.h < inf else REPORT_INTERVAL
+            )
             stepper = CoSimulation(instance, grid, signals, next_step)
-            step_to_stop(stepper, grid, self.recorder.record, report, every)
+            step_to_stop(stepper, grid, self.recorder.record, report, report_every)
             evaluations = instance.get("solver.evaluations")
         # not getbuffer(): a view that a profiler still references would keep the next run from emptying the buffer
         return RecordedRun(*read_rows(self.rows.getvalue(), self.selection, instance.is_fmi2), evaluations)

@@ -295,8 +295,8 @@ def split_kinks(inputs: Inputs, rate_inputs: Mapping[str, Sequence[str]]) -> tup
         rate = columns[rates[0]]
         slope = np.divide(np.diff(columns[name]), intervals, out=np.zeros(len(intervals)), where=moves)
         gap = np.where(moves, np.abs(slope - (rate[:-1] + rate[1:]) / 2), 0.0)
-        least = max(KINK_GAP * np.quantile(gap[moves], 0.25, method="lower"), ROUNDING * np.abs(rate).max())
-        is_kink = (gap > KINK_SHARE * np.abs(np.diff(rate))) & (gap > least)
+        min_gap = max(KINK_GAP * np.quantile(gap[moves], 0.25, method="lower"), ROUNDING * np.abs(rate).max())
+        is_kink = (gap > KINK_SHARE * np.abs(np.diff(rate))) & (gap > min_gap)
         if not 0 < is_kink.sum() <= max(2, MAX_KINKS * len(is_kink)):
             continue
         begin[rates[0]][is_kink] = end[rates[0]][is_kink] = slope[is_kink]

@@ -97,7 +97,7 @@ def test_inputs_pass_through_all_samples_after_their_error_has_been_estimated():
     record = MeasuredRecord(SimpleNamespace(spec=Spec(), prepare=prepare_impulse), data, is_averaged=False)
     problem = FitProblem([record], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
     change = subdivide_inputs(problem, np.zeros(1))
-    error = np.abs(problem.residuals(np.zeros(1), problem.all)).max()  # of splines only
+    error = np.abs(problem.residuals(np.zeros(1), problem.all_samples)).max()  # of splines only
     assert error < np.abs(change).max() < 5 * error
     assert record.subdivision > 1
     assert record.fine_inputs["F"][:: record.subdivision] == pytest.approx(force, abs=1e-9)

@@ -19,7 +19,7 @@ class Residuals(FitProblem):
 
     def __init__(self, residuals, reach=40.0):
         self.unknowns = tuple(Unknown(name, name, "", np.exp(-reach), np.exp(reach)) for name in "ab")
-        self.region, self.steps, self.central, self.all = FeasibleRegion(self.unknowns), EXACT_STEPS, False, ()
+        self.region, self.steps, self.central, self.all_samples = FeasibleRegion(self.unknowns), EXACT_STEPS, False, ()
         self.function, self.n_runs, self.derivatives = residuals, 0, None
 
     def residuals(self, z, selection):

@@ -6,7 +6,7 @@ from decays import Signal, decay_record, identify, random_record
 from variants import slow_after
 
 from harness import SceneError, read_record
-from harness.records.samples import find_saturated, mark_dropouts, mark_sentinels, sort_times
+from harness.records.samples import find_saturation, mark_dropouts, mark_sentinels, sort_times
 
 T = np.linspace(0.0, 12.0, 2401)
 ZETA = 0.0119
@@ -142,7 +142,7 @@ def test_a_rounded_or_held_motion_has_no_defects(order):
         damping, times = 10 ** rng.uniform(-4, -1.3), np.linspace(0, rng.uniform(2, 40), 1000)
         record = decay_record(damping, a=0.1, step=step, t=times, turn=turn, noise=noise, seed=seed, order=order)
         for motion in (record, random_record(seed, order=order)[0]):
-            assert find_saturated(motion.x)[1] == 0
+            assert find_saturation(motion.x)[1] == 0
             assert mark_sentinels(motion.x, "x") == mark_dropouts(motion.x, "x") == []
 
 
@@ -165,7 +165,7 @@ def test_saturation_is_long_stays_at_one_value_that_is_seldom_approached(stays, 
     x = [0.0, *near, 0.0]
     for count in stays:
         x += [*[1.0] * count, 0.0]
-    is_saturated, count = find_saturated(np.array(x))
+    is_saturated, count = find_saturation(np.array(x))
     assert count == peaks
     assert is_saturated.sum() == (sum(stays) if peaks else 0)
 
@@ -173,7 +173,7 @@ def test_saturation_is_long_stays_at_one_value_that_is_seldom_approached(stays, 
 def test_the_largest_value_of_one_peak_or_of_no_motion_is_not_saturation():
     record = swing()
     plateau = np.concatenate([np.full(400, record.x.max()), record.x[:-400]])
-    assert find_saturated(plateau)[1] == find_saturated(np.ones_like(record.x))[1] == 0
+    assert find_saturation(plateau)[1] == find_saturation(np.ones_like(record.x))[1] == 0
 
 
 def test_rows_in_no_order_are_sorted_and_reported():

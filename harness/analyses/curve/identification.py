@@ -319,8 +319,8 @@ def find_remarks(result: CurveIdentification, widening: float) -> list[str]:
     outliers = np.flatnonzero(~is_used)
     if len(outliers):
         points_text = ", ".join(describe_point(result, int(i)) for i in outliers[:MAX_LISTED])
-        more = f", and {len(outliers) - MAX_LISTED} more" * (len(outliers) > MAX_LISTED)
-        remarks.append(f"{len(outliers)} of {len(points.v)} points do not fit and are left out: {points_text}{more}.")
+        ending = f", and {len(outliers) - MAX_LISTED} more" * (len(outliers) > MAX_LISTED)
+        remarks.append(f"{len(outliers)} of {len(points.v)} points do not fit and are left out: {points_text}{ending}.")
     for name in ("v_s", "v_s+", "v_s-"):
         if name in best.values and not np.isfinite(result[name].high):
             remarks.append(

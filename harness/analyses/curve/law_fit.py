@@ -298,15 +298,15 @@ class Part:
         """Return the interval of each constant; its ends are infinite, or 0, if a v_s out of the range is possible."""
         level = float(self.best.squares[0]) + margin
         grid = self.refine(level)
-        inside = grid.squares <= level
-        reach = np.sqrt(grid.spread * np.where(inside, level - grid.squares, 0.0)[:, None])
-        low = np.where(inside[:, None], grid.constants - reach, np.inf).min(axis=0)
-        high = np.where(inside[:, None], grid.constants + reach, -np.inf).max(axis=0)
+        is_inside = grid.squares <= level
+        reach = np.sqrt(grid.spread * np.where(is_inside, level - grid.squares, 0.0)[:, None])
+        low = np.where(is_inside[:, None], grid.constants - reach, np.inf).min(axis=0)
+        high = np.where(is_inside[:, None], grid.constants + reach, -np.inf).max(axis=0)
         intervals = {
             symbol: (min(low[i], values[symbol]), max(high[i], values[symbol])) for i, symbol in enumerate(self.symbols)
         }
         if self.law.exponent:
-            first, last = grid.v_s[inside][[0, -1]] if inside.any() else (values["v_s"], values["v_s"])
+            first, last = grid.v_s[is_inside][[0, -1]] if is_inside.any() else (values["v_s"], values["v_s"])
             if first <= self.low * (1 + 1e-9):
                 first, intervals["F_s"] = 0.0, (intervals["F_s"][0], np.inf)
             intervals["v_s"] = (min(first, values["v_s"]), np.inf if last >= self.high * (1 - 1e-9) else last)
@@ -318,9 +318,9 @@ class Part:
             return self.best
         grid = self.coarse
         for _ in range(ZOOMS):
-            inside = np.flatnonzero(grid.squares <= level)
+            inner_points = np.flatnonzero(grid.squares <= level)
             nearest = int(np.argmin(np.abs(grid.v_s - self.best.v_s)))
-            first, last = min([nearest, *inside]), max([nearest, *inside])
+            first, last = min([nearest, *inner_points]), max([nearest, *inner_points])
             if last - first >= FINE // 4:
                 break
             ends = grid.v_s[max(first - 1, 0)], grid.v_s[min(last + 1, len(grid.v_s) - 1)]

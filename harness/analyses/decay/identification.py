@@ -209,9 +209,9 @@ def identify_record(
             f"deg, rad/s or deg/s, or leave out {option_text('pendulum')}"
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
-    whole_decay, half_period, choices = select_decay(record, parameters.pendulum)
-    _, quantiser_step = estimate_noise(whole_decay.t, whole_decay.x)
-    decay, block = whole_decay, block_size(whole_decay, half_period)
+    full_decay, half_period, choices = select_decay(record, parameters.pendulum)
+    _, quantiser_step = estimate_noise(full_decay.t, full_decay.x)
+    decay, block = full_decay, block_size(full_decay, half_period)
     if block > 1:
         note = f"The {len(decay.t)} samples of the decay are averaged over {block} each."
         record = thin(record, block)

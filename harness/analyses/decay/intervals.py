@@ -179,11 +179,11 @@ def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float,
     correlation : numpy.ndarray
         Correlation matrix (k, k) of the measurements.
     """
-    best, least = nearest_means(z, correlation)
+    best, distance = nearest_means(z, correlation)
 
     def excess(m: float) -> float:
         """Return the likelihood ratio of means with the first mean m, less the limit of the test."""
-        return nearest_means(z, correlation, m)[1] ** 2 - least**2 - NORMAL_QUANTILE**2
+        return nearest_means(z, correlation, m)[1] ** 2 - distance**2 - NORMAL_QUANTILE**2
 
     # the squared distance of a convex set grows at least as it does without bounds
     low, high, precision = best[0] - 2 * NORMAL_QUANTILE, best[0] + 2 * NORMAL_QUANTILE, thresholds.INTERVAL_PRECISION

@@ -135,8 +135,8 @@ def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float, int]:
         if swings is None:
             continue
         motions.append(swings)
-        proven = [decay for decay in find_decays(swings) if decay.is_proven]
-        best = max([*([best] if best else []), *proven], key=lambda decay: decay.weight, default=None)
+        proven_decays = [decay for decay in find_decays(swings) if decay.is_proven]
+        best = max([*([best] if best else []), *proven_decays], key=lambda decay: decay.weight, default=None)
         if best is not None and best.end - best.begin > thresholds.LARGE_PART * (record.t[-1] - record.t[0]):
             break
     if motions:

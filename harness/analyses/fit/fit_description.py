@@ -28,7 +28,7 @@ def describe_fit(
     z, uncertainty = raw_fit.z, raw_fit.uncertainty
     residuals = split_residuals(problem, uncertainty.residuals)
     columns = column_residuals(problem.records, residuals, problem.outputs)
-    predictions = problem.predict(z, problem.all)
+    predictions = problem.predict(z, problem.all_samples)
     assert predictions is not None
     is_unfit = any(
         column.residual > max(UNFIT_SHARE * column.range, UNFIT_NOISE * column.noise) and not is_rest
@@ -225,7 +225,7 @@ def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[Samples]) -> V
     records, predictions = [], []
     for record_data in data:
         record = prepare_record(problem, raw_fit, record_data)
-        prediction = problem.predict_record(raw_fit.z, record, 0, record.all)
+        prediction = problem.predict_record(raw_fit.z, record, 0, record.all_samples)
         if prediction is None:
             raise HarnessError(
                 f"the FMU refuses the fitted values in the run of the validation record {record_data.name}"

@@ -56,8 +56,8 @@ class FitProblem:
         self.sensors = [(i, unknown) for i, unknown in enumerate(self.unknowns) if unknown.column is not None]
         self.region = FeasibleRegion(self.unknowns)
         self.low, self.high = np.array([unknown.search_range for unknown in self.unknowns]).T
-        self.all: Selection = tuple(record.all for record in self.records)
-        self.first_samples: Selection = tuple(index[:2] for index in self.all)
+        self.all_samples: Selection = tuple(record.all_samples for record in self.records)
+        self.first_samples: Selection = tuple(index[:2] for index in self.all_samples)
         self.central = False  # whether slopes need central differences
         self.steps = self.difference_steps()
 
@@ -122,7 +122,7 @@ class FitProblem:
         if predicted is None:
             return None
         parts = [
-            ((y - (record.y if index is record.all else record.part(index).y)) / record.noise).ravel()
+            ((y - (record.y if index is record.all_samples else record.part(index).y)) / record.noise).ravel()
             for y, record, index in zip(predicted, self.records, selection, strict=True)
         ]
         return self.limit_outliers(np.concatenate(parts))
@@ -144,7 +144,7 @@ class FitProblem:
         They are longer where runs with nearly equal values scatter, as those of solvers with step control do. The
         scatter is that of third differences.
         """
-        index = tuple(samples[:: max(1, len(samples) // 200)] for samples in self.all)
+        index = tuple(samples[:: max(1, len(samples) // 200)] for samples in self.all_samples)
         for share in (0.5, 0.4, 0.6, 0.3, 0.7):
             z = self.low + (self.high - self.low) * share
             e = [residuals for i in range(4) if (residuals := self.residuals(z + 1e-7 * i, index)) is not None]
@@ -219,12 +219,12 @@ class FitProblem:
         Steps that are too short or too long add errors, which increase the determinant: a direction that hardly
         changes the residuals looks better determined than it is.
         """
-        if (exact := self.exact_jacobian(z, e, self.all)) is not None:
+        if (exact := self.exact_jacobian(z, e, self.all_samples)) is not None:
             return exact
         best, lowest = self.steps, np.inf
         for steps in ALL_STEPS:
             self.steps = steps
-            jacobian = self.jacobian(z, e, self.all, np.arange(len(z)), central=True)
+            jacobian = self.jacobian(z, e, self.all_samples, np.arange(len(z)), central=True)
             size = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])
             if size < lowest - CLEAR or lowest == np.inf:
                 best, lowest, best_jacobian = steps, size, jacobian

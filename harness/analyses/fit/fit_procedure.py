@@ -96,11 +96,11 @@ def fit_records(
         if not sizes.all():
             raise HarnessError(f"{record_data.name} shows no motion in a column: nothing can be determined from it")
         for name, size in zip(record_data.columns, sizes.tolist(), strict=True):
-            least, largest = MIN_SIGMA * size, MAX_SIGMA * size
-            if not least <= record_data.sigma.get(name, size) <= largest:
+            smallest, largest = MIN_SIGMA * size, MAX_SIGMA * size
+            if not smallest <= record_data.sigma.get(name, size) <= largest:
                 raise SceneError(
                     f"sigma of {name} is {record_data.sigma[name]!r}, and the samples of {record_data.name} span "
-                    f"{size:.3g}: give the standard deviation of the noise, from {least:.3g} to {largest:.3g}"
+                    f"{size:.3g}: give the standard deviation of the noise, from {smallest:.3g} to {largest:.3g}"
                 )
     warm_start: np.ndarray | None = None
     for is_averaged in (True, False) if averages else (False,):
@@ -126,7 +126,7 @@ def is_averaging_negligible(problem: FitProblem, raw_fit: RawFit) -> bool:
         errors.append(record_errors.ravel())
     if not any(map(np.any, errors)):
         return True  # nothing was averaged
-    jacobian = problem.jacobian(z, uncertainty.residuals, problem.all, np.arange(len(z)), central=True)
+    jacobian = problem.jacobian(z, uncertainty.residuals, problem.all_samples, np.arange(len(z)), central=True)
     shift = np.linalg.lstsq(jacobian, np.concatenate(errors), rcond=None)[0]
     residual_variance = uncertainty.squares / max(len(uncertainty.residuals) - len(z), 1)
     deviations = uncertainty.deviations * (residual_variance / uncertainty.variance) ** 0.5
@@ -134,7 +134,7 @@ def is_averaging_negligible(problem: FitProblem, raw_fit: RawFit) -> bool:
 
 
 def search_and_refine(
-    problem: FitProblem, warm_start: np.ndarray | None, noise_is_known: bool, report: Callable[[float], None]
+    problem: FitProblem, warm_start: np.ndarray | None, is_noise_known: bool, report: Callable[[float], None]
 ) -> RawFit:
     """Search, refine and find intervals; start again at each better minimum."""
     starts = starting_points(problem, warm_start)
@@ -156,7 +156,7 @@ def search_and_refine(
     sides = [(i, side) for i in range(len(z)) for side in (-1, 1)]
     searched_squares = np.inf  # at the last search for other minima
     for remaining_rounds in reversed(range(ROUNDS)):
-        squares, z = problem.minimize(z, problem.all, 30, 1e-9, central=True)
+        squares, z = problem.minimize(z, problem.all_samples, 30, 1e-9, central=True)
         check_motion(problem, squares)
         uncertainty = estimate_uncertainty(problem, z, input_error, 0.0)
         report(0.6)
@@ -180,7 +180,7 @@ def search_and_refine(
             break
     else:
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
-    if noise_is_known and uncertainty.variance < 1.0:  # residuals below the noise: the intervals are those of the noise
+    if is_noise_known and uncertainty.variance < 1.0:  # residuals below the noise: the intervals are those of the noise
         uncertainty = estimate_uncertainty(problem, z, input_error, 1.0)
         minima, flat_tails = find_other_minima(problem, z, uncertainty, result.minima, squares), []
         for i, side in sides:
@@ -209,7 +209,7 @@ def thin_selection(problem: FitProblem) -> Selection:
     """Return all samples of short records and evenly spaced ones of long records."""
     return tuple(
         index if len(index) < MAX_THIN else np.unique(np.linspace(0, len(index) - 1, THIN).astype(int))
-        for index in problem.all
+        for index in problem.all_samples
     )
 
 
@@ -238,21 +238,21 @@ def subdivide_inputs(problem: FitProblem, z: np.ndarray) -> np.ndarray:
     no_change = np.zeros(problem.n_samples)
     if not any(record.inputs for record in problem.records):
         return no_change
-    before = problem.residuals(z, problem.all)
+    before = problem.residuals(z, problem.all_samples)
     parts = 1
     while parts < MAX_SUBDIVISION:
         parts *= 2
         for record in problem.records:
             record.subdivide(parts)
-        now = problem.residuals(z, problem.all)
+        after = problem.residuals(z, problem.all_samples)
         limit = INPUT_CHANGE * problem.scatter
-        is_fine = before is not None and now is not None and np.abs(now - before).max() < limit
-        before = now
+        is_fine = before is not None and after is not None and np.abs(after - before).max() < limit
+        before = after
         if is_fine:
             break
     for record in problem.records:
-        record.subdivide(parts, every=2)
-    coarse = problem.residuals(z, problem.all)
+        record.subdivide(parts, stride=2)
+    coarse = problem.residuals(z, problem.all_samples)
     for record in problem.records:
         record.subdivide(parts)
     return no_change if coarse is None or before is None else (coarse - before) / SPLINE_RATIO
@@ -270,10 +270,12 @@ def find_other_minima(
     starts += [z + axes @ (reach * random.normal(size=len(z))) for _ in range(DRAWS)]
     steps = 25 if problem.central else 12
     if problem.n_samples > 2 * COARSE_SAMPLES * len(problem.records):
-        sparse = tuple(np.unique(np.linspace(0, index[-1], COARSE_SAMPLES).astype(int)) for index in problem.all)
+        sparse = tuple(
+            np.unique(np.linspace(0, index[-1], COARSE_SAMPLES).astype(int)) for index in problem.all_samples
+        )
         coarse = select_distinct([problem.minimize(start, sparse, steps, 1e-4) for start in starts], len(starts))
         starts = [position for value, position in coarse if value < coarse[0][0] + 3 * limit]
-    ends = [problem.minimize(start, problem.all, steps, 1e-6) for start in starts]
+    ends = [problem.minimize(start, problem.all_samples, steps, 1e-6) for start in starts]
     return select_distinct([end for end in ends if end[0] < squares + limit], len(ends))
 
 

@@ -149,7 +149,7 @@ class MeasuredRecord:
         self.scatter = np.maximum(scatter, self.step / 12**0.5)
         known_sigma = np.array([data.sigma.get(name, 0.0) for name in data.columns])
         self.noise = np.where(known_sigma > 0, known_sigma / np.sqrt(self.width), self.scatter)
-        self.all = np.arange(len(self.t))
+        self.all_samples = np.arange(len(self.t))
         self.parts: dict[int, RecordPart] = {}
         self.subdivide(1)
 
@@ -158,15 +158,15 @@ class MeasuredRecord:
         """Return the samples for the result, without the runs."""
         return FittedRecord(self.name, self.t, self.y, self.noise, self.sampled_t, self.width)
 
-    def subdivide(self, parts: int, every: int = 1) -> None:
-        """Divide the intervals between samples; there, inputs are splines through each `every`-th sample."""
+    def subdivide(self, parts: int, stride: int = 1) -> None:
+        """Divide the intervals between samples; there, inputs are splines through each `stride`-th sample."""
         self.subdivision, t = parts, self.knots
         shares = np.arange(parts) / parts
         self.fine_t = np.append((t[:-1, None] + np.diff(t)[:, None] * shares).ravel(), t[-1])
-        if parts == every == 1:
+        if parts == stride == 1:
             self.fine_inputs = self.inputs
         else:
-            spline_rows = np.unique(np.append(np.arange(0, len(t), every), len(t) - 1))
+            spline_rows = np.unique(np.append(np.arange(0, len(t), stride), len(t) - 1))
             self.fine_inputs = {
                 name: CubicSpline(t[spline_rows], u[spline_rows])(self.fine_t) for name, u in self.inputs.items()
             }

@@ -257,8 +257,8 @@ def search_bound(
     if excess < -BETTER and ends_at_better:
         return Bound(None, position)
     if excess < 1:
-        behind = profile_bound(problem, position, uncertainty, i, side, ends_at_better, max(excess, 0.0) * target)
-        return replace(behind, profile=bound.profile + behind.profile)
+        far_bound = profile_bound(problem, position, uncertainty, i, side, ends_at_better, max(excess, 0.0) * target)
+        return replace(far_bound, profile=bound.profile + far_bound.profile)
     return replace(bound, has_flat_tail=excess < FLAT)
 
 
@@ -293,12 +293,12 @@ def fit_others(
         if not np.isfinite(into_region).all():
             return np.inf, start
         start[others] += into_region
-        e = problem.residuals(start, problem.all)
+        e = problem.residuals(start, problem.all_samples)
         if e is None:
             problem.region.add_refusal(problem.is_refused, z, start - z)
         elif e @ e < lowest:
             best, lowest = start, e @ e
-    return problem.minimize(best, problem.all, MAX_STEPS, min_gain, others, goal=limit)
+    return problem.minimize(best, problem.all_samples, MAX_STEPS, min_gain, others, goal=limit)
 
 
 def depends_on_limits(problem: FitProblem, z: np.ndarray, i: int, target: float) -> bool:
@@ -308,8 +308,8 @@ def depends_on_limits(problem: FitProblem, z: np.ndarray, i: int, target: float)
     """
     limits = np.array([unknown.limits for unknown in problem.unknowns])
     outward = np.where(z < limits[:, 0] + NEAR_LIMIT, -1.0, 0.0) + np.where(z > limits[:, 1] - NEAR_LIMIT, 1.0, 0.0)
-    e, others = problem.residuals(z, problem.all), np.flatnonzero(outward)
+    e, others = problem.residuals(z, problem.all_samples), np.flatnonzero(outward)
     if i in others or e is None:
         return True
-    slopes = 2 * e @ problem.jacobian(z, e, problem.all, others, central=True)
+    slopes = 2 * e @ problem.jacobian(z, e, problem.all_samples, others, central=True)
     return bool((-slopes * outward[others] * WIDER > NEGLIGIBLE * target).any())

@@ -190,11 +190,11 @@ def absolute_cost(problem: FitProblem, z: np.ndarray, selection: Selection) -> f
     return REFUSED_COST * problem.scatter if e is None else float(np.abs(e).sum())
 
 
-def select_distinct(minima: list[Minimum], most: int) -> list[Minimum]:
+def select_distinct(minima: list[Minimum], max_count: int) -> list[Minimum]:
     """Return the lowest minima that differ from each other."""
     distinct_minima: list[Minimum] = []
     for squares, z in sorted(minima, key=lambda minimum: minimum[0]):
         is_new = all(np.abs(z - other).max() > DISTINCT for _, other in distinct_minima)
-        if np.isfinite(squares) and len(distinct_minima) < most and is_new:
+        if np.isfinite(squares) and len(distinct_minima) < max_count and is_new:
             distinct_minima.append((squares, z))
     return distinct_minima

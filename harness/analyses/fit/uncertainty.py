@@ -91,7 +91,7 @@ def estimate_uncertainty(
     min_variance : float
         Lower bound of the variance of the residuals: 1 if the noise is known, otherwise 0.
     """
-    e = problem.residuals(z, problem.all)
+    e = problem.residuals(z, problem.all_samples)
     assert e is not None
     jacobian = problem.choose_steps(z, e)
     variance = max(float(e @ e) / max(len(e) - len(z), 1), min_variance, rounding_variance(problem))
@@ -177,7 +177,7 @@ def quantiser_variance(
     random, shifts = np.random.default_rng(0), []
     reach = np.minimum(np.sqrt(12 * len(jacobian) / eigenvalues / len(z)), 0.05)
     for _ in range(QUANTISER_DRAWS):
-        predicted = problem.predict(z + axes @ (reach * random.normal(size=len(z))), problem.all)
+        predicted = problem.predict(z + axes @ (reach * random.normal(size=len(z))), problem.all_samples)
         if predicted is None:
             continue
         errors = []

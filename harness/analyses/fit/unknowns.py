@@ -84,9 +84,9 @@ class Unknown:
     @property
     def limits(self) -> tuple[float, float]:
         """Return the limits of a fit in the coordinate, beyond which no interval is followed."""
-        beyond = log(BEYOND_FACTOR) if self.sign else BEYOND_FACTOR
+        margin = log(BEYOND_FACTOR) if self.sign else BEYOND_FACTOR
         low, high = self.search_range
-        return low - beyond, high + beyond
+        return low - margin, high + margin
 
     def coordinate_bounds(self) -> tuple[float, float]:
         """Return the limits of the FMU in the coordinate, infinite if it has none."""
@@ -141,15 +141,15 @@ class FeasibleRegion:
 
         if len(self.normals) > MAX_PLANES or not is_refused(z + step):
             return
-        inside = z + step * max(accepted_share(z, step) - 1e-6, 0.0)
+        inner_point = z + step * max(accepted_share(z, step) - 1e-6, 0.0)
         normal = np.zeros(len(z))
         for i, axis in enumerate(PROBE * np.eye(len(z))):
             for side in (1, -1):
-                if is_refused(inside + side * axis):
-                    normal[i] = side / (PROBE * max(accepted_share(inside, side * axis), 1e-9))
+                if is_refused(inner_point + side * axis):
+                    normal[i] = side / (PROBE * max(accepted_share(inner_point, side * axis), 1e-9))
         if normal.any():
             size = np.linalg.norm(normal)
-            self.add(normal / size, float((normal @ inside + 1) / size) - 1e-9)
+            self.add(normal / size, float((normal @ inner_point + 1) / size) - 1e-9)
 
     def constrained_step(self, matrix: np.ndarray, slope: np.ndarray, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """Return the step s of the `free` coordinates with the least s.matrix.s/2 + slope.s inside the region.

@@ -94,8 +94,8 @@ class ExternalFmu:
             time_text = f" at t = {time[-1]:.9g} s" if len(time) and " at t = " not in message else ""
             message = ": ".join(filter(None, (message + time_text, log.error_message)))
         self.n_runs += 1
-        is_terminated, step_refused = isinstance(cause, TerminatedError), isinstance(cause, StepRefusedError)
-        return RefinementRun(number, time, columns, message, is_terminated, step_refused)
+        is_terminated, is_step_refused = isinstance(cause, TerminatedError), isinstance(cause, StepRefusedError)
+        return RefinementRun(number, time, columns, message, is_terminated, is_step_refused)
 
     def record(self, path: Path, log: LogCapture, h: float, tolerance: float) -> None:
         """Run a new instance and record its rows; exceptions propagate."""

@@ -50,7 +50,7 @@ class RefinementRun:
     columns: Columns
     message: str = ""
     is_terminated: bool = False
-    step_refused: bool = False
+    is_step_refused: bool = False
 
 
 @dataclass(frozen=True)
@@ -236,9 +236,9 @@ def refine_steps(spec: RunSpec, run: RunFunction, show: NoteCallback) -> Refinem
     previous: RefinementRun | None = None
     while h >= min(duration / MAX_STEPS, coarsest.h / 2):
         current = run(h, solver_tolerance(spec))
-        if current.message and not (current.is_terminated or current.step_refused):
+        if current.message and not (current.is_terminated or current.is_step_refused):
             return keep_longest_run(previous, current)
-        if previous and not (current.step_refused or previous.step_refused):
+        if previous and not (current.is_step_refused or previous.is_step_refused):
             change = largest_change(previous, current, spec)
             if change.size == 0.0:
                 return refine_solver_tolerance(spec, h, current, run, show)
@@ -251,7 +251,7 @@ def refine_steps(spec: RunSpec, run: RunFunction, show: NoteCallback) -> Refinem
             if reason := reason_to_stop(convergence, duration / h, spec.rtol):
                 return accept_inexact_run(spec, current, step, convergence, find_internal_step(current) or reason)
         previous, h = current, h / 2
-    if current.step_refused or not convergence.changes:
+    if current.is_step_refused or not convergence.changes:
         return keep_longest_run(None, current)
     return accept_inexact_run(spec, current, step, convergence, f"more than {MAX_STEPS} steps are not taken")
 
