@@ -16,7 +16,7 @@ from .equations.model_file import ModelFile
 from .model_lookup import FMUS
 from .syntax_trees import parsed_module
 
-ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # replaced by generated or empty files
+ROOT, PYTHONFMU_ROOT = "__init__.py", "pythonfmu/__init__.py"  # replaced by generated or empty files
 SLAVE = "runtime/slave.py"  # embedded with every model
 INIT_SOURCE = '''\
 """{name} as an FMI 2.0 co-simulation slave."""
@@ -44,14 +44,14 @@ def embedded_files(source: ModelFile, texts: Mapping[str, str], root: Path = FMU
     Files are taken from `texts` if they are there, else from `root`.
     """
     files = {ROOT: INIT_SOURCE.format(name=source.name, model=source.class_name)}
-    pending = [f"{source.name}.py", SLAVE]
-    for path in pending:  # the list grows during the loop
-        if path == VENDORED:
+    pending_paths = [f"{source.name}.py", SLAVE]
+    for path in pending_paths:  # the list grows during the loop
+        if path == PYTHONFMU_ROOT:
             files[path] = ""
         elif path not in files:
             text = texts[path] if path in texts else _on_disk(path, root).read_text(encoding="utf-8")
             files[path], imports = _embed(path, text, root)
-            pending += imports
+            pending_paths += imports
     return files
 
 
@@ -91,6 +91,6 @@ def _resolve(path: str, base: tuple[str, ...], name: str, root: Path) -> str:
     """Return the file that `from base import name` reads: module `base.name`, or `base` if name is defined in it."""
     for parts in ((*base, name), base):
         for candidate in ("/".join(parts) + ".py", "/".join((*parts, "__init__.py"))):
-            if candidate not in (ROOT, VENDORED) and _on_disk(candidate, root).is_file():
+            if candidate not in (ROOT, PYTHONFMU_ROOT) and _on_disk(candidate, root).is_file():
                 return candidate
     raise BuildError(f"{path} imports {name} from {'.'.join(base) or 'the package itself'}, which FMUs do not include.")

@@ -100,6 +100,6 @@ def unit_of(name: str, symbol: str, display: str = "") -> Unit:
             f"{', '.join(SYMBOLS)}, such as N.m.s/rad or W/(m2.K)."
         )
     if display not in ("", symbol, unit.display):
-        allowed = " or ".join(repr(word) for word in (symbol, unit.display) if word)
-        raise BuildError(f"{name} has the display unit {display!r}; allowed for {symbol}: {allowed}.")
+        choices = " or ".join(repr(word) for word in (symbol, unit.display) if word)
+        raise BuildError(f"{name} has the display unit {display!r}; allowed for {symbol}: {choices}.")
     return unit

@@ -40,7 +40,7 @@ class CertifiedResult:
         return f"Certified result of the default experiment: {self.provenance}."
 
 
-def find_certified_result(path: Path, model: Any, declared: Variables) -> CertifiedResult | None:
+def find_certified_result(path: Path, model: Any, declarations: Variables) -> CertifiedResult | None:
     """Return the certified result of the model file, or None.
 
     The result is valid only for FMUs that include the hybrid law, where the model has friction laws.
@@ -49,7 +49,7 @@ def find_certified_result(path: Path, model: Any, declared: Variables) -> Certif
     if laws and "hybrid" not in laws:
         return None
     file = path.with_suffix(".csv")
-    return _read_table(file, len(integrated_states(declared))) if file.is_file() else None
+    return _read_table(file, len(integrated_states(declarations))) if file.is_file() else None
 
 
 def _read_table(file: Path, states: int) -> CertifiedResult:
@@ -77,13 +77,18 @@ def _is_row(row: list[str], states: int) -> bool:
         return False
 
 
-def result_files(name: str, certified: CertifiedResult, declared: Variables) -> dict[str, bytes]:
+def result_files(name: str, certified_result: CertifiedResult, declarations: Variables) -> dict[str, bytes]:
     """Return the result and its manifest by path in the FMU."""
-    lines = [["time", *(variable for variable, _ in integrated_states(declared))], *certified.rows]
+    lines = [["time", *(variable for variable, _ in integrated_states(declarations))], *certified_result.rows]
     result = "".join(",".join(line) + "\n" for line in lines)
     root = Element("fmiReferences", {"xmlns:fmi-ls": NAMESPACE})
     for key, text in STANDARD.items():
         root.set(f"fmi-ls:fmi-ls-{key}", text)
-    related = {"source": f"{name}_out.csv", "role": "result", "type": "text/csv", "description": certified.caption}
-    SubElement(root, "Related", related)
+    attributes = {
+        "source": f"{name}_out.csv",
+        "role": "result",
+        "type": "text/csv",
+        "description": certified_result.caption,
+    }
+    SubElement(root, "Related", attributes)
     return {f"{RESULT_FOLDER}/{name}_out.csv": result.encode(), f"{RESULT_FOLDER}/fmi-ls-manifest.xml": xml_bytes(root)}

@@ -14,12 +14,12 @@ from ..runtime.variable_declarations import VariableOwner
 from .fmi_variables import Variables, friction_laws
 
 
-def output_dependencies(model: type[VariableOwner], declared: Variables, at_start: bool) -> dict[str, list[str]]:
+def output_dependencies(model: type[VariableOwner], declarations: Variables, at_start: bool) -> dict[str, list[str]]:
     """Return for every output the variables that it depends on: parameters, inputs, and states unless `at_start`.
 
     At the start the states have the values of parameters.
     """
-    outputs = [name for name, meaning in declared if meaning.causality == "output"]
+    outputs = [name for name, meaning in declarations if meaning.causality == "output"]
     if not outputs:
         return {}
     analysis = ANALYSES[model]
@@ -32,30 +32,32 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
     values = start if at_start else {}
     rates = analysis.declared_derivatives()
 
-    def among(*terms: Operand) -> set[Expression]:
+    def variables_of(*terms: Operand) -> set[Expression]:
         return {leaf for e in terms for leaf in variables_in(substitute(substitute(e, values), rates))}
 
     def of_mode(c: Contact) -> set[Expression]:
         contacts = [c] if c in analysis.load else analysis.contacts
-        held = [*analysis.load_expressions(c), *(analysis.holding_limit[d] for d in contacts)] if HYBRID in laws else []
-        load_rates = [differentiate(e, analysis.coasting_derivatives) for e in held]
+        holding_terms = (
+            [*analysis.load_expressions(c), *(analysis.holding_limit[d] for d in contacts)] if HYBRID in laws else []
+        )
+        load_rates = [differentiate(e, analysis.coasting_derivatives) for e in holding_terms]
         others = [e for d in contacts if d is not c for e in (d.slip, d.slide)]
-        return among(c.slip, *held, *load_rates, *others, *([c.eps] if THRESHOLD in laws else []))
+        return variables_of(c.slip, *holding_terms, *load_rates, *others, *([c.eps] if THRESHOLD in laws else []))
 
     def of_force(c: Contact) -> set[Expression]:
-        return of_mode(c) | among(
+        return of_mode(c) | variables_of(
             c.slide, *([] if laws == [SIGN] else [*analysis.load_expressions(c), analysis.holding_limit[c]])
         )
 
     def follows(e: Expression) -> set[str]:
-        variables = among(e)
+        variables = variables_of(e)
         contact_variables = [
             of_force(c) if c in variables else of_mode(c) for c in analysis.contacts if {c, c.mode} & variables
         ]
         names = {variable.name for part in (variables, *contact_variables) for variable in part}
         return names | {"friction"} if contact_variables and laws[1:] else names
 
-    equations = {e.name: follows(e) for e in analysis.declared if e.name in outputs}
-    knowns = {name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES}
-    knowns |= set() if at_start else {name for name, meaning in declared if meaning.role == "state"}
-    return {output: [name for name, _ in declared if name in knowns & equations[output]] for output in outputs}
+    equations = {e.name: follows(e) for e in analysis.variables if e.name in outputs}
+    knowns = {name for name, meaning in declarations if meaning.causality in SETTABLE_CAUSALITIES}
+    knowns |= set() if at_start else {name for name, meaning in declarations if meaning.role == "state"}
+    return {output: [name for name, _ in declarations if name in knowns & equations[output]] for output in outputs}

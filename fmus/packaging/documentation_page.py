@@ -41,13 +41,13 @@ CAPABILITIES = """\
 | intermediate update after each internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |
 """  # of each kind of FMU; docs/how-to/native.md has the same table
-UNRESTRICTED = VariableDeclaration("", "").allowed  # the range text of an unbounded variable
+UNRESTRICTED_RANGE = VariableDeclaration("", "").allowed_range  # the range text of an unbounded variable
 
 
 def documentation_page(
     model: type[VariableOwner],
     name: str,
-    declared: Variables,
+    declarations: Variables,
     result: CertifiedResult | None,
     tables: Sequence[Table],
     icon: str,
@@ -63,13 +63,13 @@ def documentation_page(
     parts = [f"<header>{picture}<div>{title}</div></header>", "<h2>Equations</h2>"]
     parts += map(format_paragraph, blocks)
     if result is not None:
-        parts += _result_figure(result, declared)
+        parts += _result_figure(result, declarations)
     if tables:
         parts += ["<h2>Tables</h2>", *map(table_figure, tables)]
-    choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
+    choices = [(variable, meaning) for variable, meaning in declarations if meaning.items]
     for variable, meaning in (*fixed_choices(model), *choices):
         parts.append(_enumeration_table(variable, meaning))
-    numbers = [(variable, meaning) for variable, meaning in declared if not meaning.items]
+    numbers = [(variable, meaning) for variable, meaning in declarations if not meaning.items]
     for title, rows in (
         ("Parameters", [pair for pair in numbers if pair[1].causality == "parameter" and "." not in pair[0]]),
         ("Input", [pair for pair in numbers if pair[1].causality == "input"]),
@@ -112,11 +112,11 @@ def readable_unit(unit: str) -> str:
     return re.sub(r"(?<=[a-z])2", "²", re.sub(r"(?<=[A-Za-z])\.", "·", unit)) if unit != "1" else ""
 
 
-def _result_figure(result: CertifiedResult, declared: Variables) -> list[str]:
+def _result_figure(result: CertifiedResult, declarations: Variables) -> list[str]:
     """Return a figure of the certified states over time."""
     times, *columns = ([float(word) for word in column] for column in zip(*result.rows, strict=True))
     parts = ["<h2>Default run</h2>", "<figure>"]
-    for values, (variable, meaning) in zip(columns, integrated_states(declared), strict=True):
+    for values, (variable, meaning) in zip(columns, integrated_states(declarations), strict=True):
         unit, factor = meaning.unit, 1.0
         if meaning.display:
             unit, factor = meaning.display, unit_of(variable, meaning.unit).factor
@@ -160,9 +160,11 @@ def _variable_table(variables: Variables) -> str:
         settable = meaning.causality in SETTABLE_CAUSALITIES
         value = f"{meaning.start:.10g}" if settable else ""
         if settable and meaning.display:
-            displayed = meaning.start * unit_of(variable, meaning.unit).factor
-            value = f"{displayed:.10g} {readable_unit(meaning.display)} = {value}"
-        notes = [readable_unit(meaning.allowed)] if settable and meaning.allowed != UNRESTRICTED else []
+            display_value = meaning.start * unit_of(variable, meaning.unit).factor
+            value = f"{display_value:.10g} {readable_unit(meaning.display)} = {value}"
+        notes = (
+            [readable_unit(meaning.allowed_range)] if settable and meaning.allowed_range != UNRESTRICTED_RANGE else []
+        )
         if meaning.variability == "fixed":
             notes.append("fixed")
         text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
@@ -176,8 +178,8 @@ def _variable_table(variables: Variables) -> str:
 
 def _capabilities_table() -> str:
     """Return the table of capabilities of each kind of FMU."""
-    marked = re.sub("`(.*?)`", r"<code>\1</code>", CAPABILITIES)
-    head, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in marked.splitlines())
+    text = re.sub("`(.*?)`", r"<code>\1</code>", CAPABILITIES)
+    head, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines())
     titles = "".join(f"<th>{title}</th>" for title in head)
     lines = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
     return f"<table class='offered'><thead><tr>{titles}</tr></thead>{lines}</table>"
@@ -186,9 +188,9 @@ def _capabilities_table() -> str:
 def _footer(model: type[VariableOwner], result: CertifiedResult | None) -> str:
     """Return the footer: default experiment, licences and version."""
     run = f"Default run: 0 to {model.stop_time:g} s, tolerance {model.tolerance:g}."  # type: ignore[attr-defined]
-    certified = f" Certified result: <a href='../{RESULT_FOLDER}/'>{RESULT_FOLDER}</a>." if result else ""
+    link = f" Certified result: <a href='../{RESULT_FOLDER}/'>{RESULT_FOLDER}</a>." if result else ""
     licences = " Licences: <a href='licenses/'>licenses</a>."
-    return f"<footer>{run}{certified}{licences} friction-fmus {__version__}.</footer>"
+    return f"<footer>{run}{link}{licences} friction-fmus {__version__}.</footer>"
 
 
 def draw_chart(times: list[float], values: list[float], label: str, axis: str = "time in s") -> str:
@@ -223,9 +225,11 @@ def relative_path(points: list[tuple[float, float]]) -> str:
     >>> relative_path([(0.0, 1.0), (0.26, 1.0), (0.5, 0.5)])
     'M0 1l0.3 0 0.2 -0.5'
     """
-    rounded = [(round(10.0 * x), round(10.0 * y)) for x, y in points]  # in tenths, so that roundings do not add up
-    steps = [(x - x0, y - y0) for (x0, y0), (x, y) in pairwise(rounded)]
-    start = "M{:g} {:g}l".format(*(place / 10.0 for place in rounded[0]))
+    rounded_points = [
+        (round(10.0 * x), round(10.0 * y)) for x, y in points
+    ]  # in tenths, so that roundings do not add up
+    steps = [(x - x0, y - y0) for (x0, y0), (x, y) in pairwise(rounded_points)]
+    start = "M{:g} {:g}l".format(*(place / 10.0 for place in rounded_points[0]))
     return start + " ".join(f"{dx / 10.0:g} {dy / 10.0:g}" for dx, dy in steps)
 
 

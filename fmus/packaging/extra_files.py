@@ -31,7 +31,7 @@ FLANGES = {  # unit of the input -> units of position and speed, and member name
 def extra_files(
     model: type[VariableOwner],
     path: Path,
-    declared: Variables,
+    declarations: Variables,
     analysis: ModelAnalysis,
     icon: str = "model.png",
     use: str = "",
@@ -42,18 +42,18 @@ def extra_files(
     name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how to run the FMU.
     """
     name, picture = path.stem, path.with_suffix(".png")
-    certified = find_certified_result(path, model, declared)
+    certified_result = find_certified_result(path, model, declarations)
     icon_path = icon if picture.is_file() else ""
-    page = documentation_page(model, name, declared, certified, analysis.tables, icon_path, use)
-    entries = {"documentation/index.html": page, MODEL_DATA_FILE: model_data(model, declared, analysis)}
-    if certified is not None:
-        entries |= result_files(name, certified, declared)
+    page = documentation_page(model, name, declarations, certified_result, analysis.tables, icon_path, use)
+    entries = {"documentation/index.html": page, MODEL_DATA_FILE: model_data(model, declarations, analysis)}
+    if certified_result is not None:
+        entries |= result_files(name, certified_result, declarations)
     if picture.is_file():
         entries[icon] = picture.read_bytes()
     return entries
 
 
-def model_data(model: type[VariableOwner], declared: Variables, analysis: ModelAnalysis) -> bytes:
+def model_data(model: type[VariableOwner], declarations: Variables, analysis: ModelAnalysis) -> bytes:
     """Return the content of resources/model_data.json.
 
     tables
@@ -73,11 +73,11 @@ def model_data(model: type[VariableOwner], declared: Variables, analysis: ModelA
             for attribute, is_open in (("min", meaning.above >= meaning.low), ("max", meaning.below <= meaning.high))
             if is_open and attribute in type_attributes(name, meaning)
         ]
-        for name, meaning in declared
+        for name, meaning in declarations
     }
     content: dict[str, Any] = {
         "tables": [table.as_json() for table in analysis.tables],
-        "contacts": mode_names(model, declared),
+        "contacts": mode_names(model, declarations),
         "rate_inputs": analysis.rate_inputs,
         "fixed_choices": {
             name: {"label": label, "value": value}
@@ -89,22 +89,22 @@ def model_data(model: type[VariableOwner], declared: Variables, analysis: ModelA
     return (json.dumps(content, indent=1) + "\n").encode()
 
 
-def terminals(declared: Variables, is_planar: bool = False) -> dict[str, bytes]:
+def terminals(declarations: Variables, is_planar: bool = False) -> dict[str, bytes]:
     """Return the XML file and its icon by path; empty unless the model has one body and one force or torque input.
 
     A body in a plane has two of each, in this order; the names of their members end in _x and _y.
     """
-    names = {meaning.name: name for name, meaning in declared}
-    inputs = [(name, meaning) for name, meaning in declared if meaning.causality == "input"]
-    moving = [(name, meaning) for name, meaning in declared if meaning.role == "state" and meaning.rate_of]
+    names = {meaning.name: name for name, meaning in declarations}
+    inputs = [(name, meaning) for name, meaning in declarations if meaning.causality == "input"]
+    speeds = [(name, meaning) for name, meaning in declarations if meaning.role == "state" and meaning.rate_of]
     axes = ("_x", "_y") if is_planar else ("",)
-    if len(inputs) != len(axes) or len(moving) != len(axes):
+    if len(inputs) != len(axes) or len(speeds) != len(axes):
         return {}
     members: list[tuple[str, str, str]] = []  # name, variable, kind
-    for axis, (force, load), (speed, meaning) in zip(axes, inputs, moving, strict=True):
+    for axis, (force, load), (speed, meaning) in zip(axes, inputs, speeds, strict=True):
         units, labels = FLANGES.get(load.unit, ((), ()))
         position = names[meaning.rate_of]
-        if (dict(declared)[position].unit, meaning.unit) != units:
+        if (dict(declarations)[position].unit, meaning.unit) != units:
             return {}
         variables = (position, "signal"), (speed, "signal"), (force, "inflow")
         members += [(label + axis, *variable) for label, variable in zip(labels, variables, strict=True)]

@@ -31,35 +31,35 @@ class ContinuousLocal(Local):
 def declared_variables(model: Any) -> Variables:
     """Return name and declaration of the variables of a model class and its solver; a mode names its contact."""
     instance = model()
-    declared = fmi_variables(instance, RunState(instance))
-    force_of = {mode: force for force, mode in mode_names(model, declared).items()}
+    declarations = fmi_variables(instance, RunState(instance))
+    force_of = {mode: force for force, mode in mode_names(model, declarations).items()}
     return [
-        (name, name_contact(meaning, force_of[name]) if name in force_of else meaning) for name, meaning in declared
+        (name, name_contact(meaning, force_of[name]) if name in force_of else meaning) for name, meaning in declarations
     ]
 
 
-def mode_names(model: Any, declared: Variables) -> dict[str, str]:
+def mode_names(model: Any, declarations: Variables) -> dict[str, str]:
     """Return the name of the mode of each contact, by that of its friction force."""
-    forces = [name for name, meaning in declared if meaning.role == "contact"]
+    forces = [name for name, meaning in declarations if meaning.role == "contact"]
     return dict(zip(forces, model.contacts, strict=True))
 
 
 def name_contact(mode: VariableDeclaration, force: str) -> VariableDeclaration:
     """Return the declaration of a mode with the force of its contact in its text, where importers find it."""
-    named = copy(mode)
-    named.text = f"mode of {force}: {mode.text}"
-    return named
+    declaration = copy(mode)
+    declaration.text = f"mode of {force}: {mode.text}"
+    return declaration
 
 
 def fixed_choices(model: Any) -> Variables:
     """Return name and declaration, with its one item, of each enumeration that the build fixed: it is no variable."""
     instance = model()
-    declared = variables(instance) + variables(RunState(instance))
-    offered = {name for name, _ in declared_variables(model)}
-    fixed = [(name, copy(meaning)) for name, meaning in declared if meaning.items and name not in offered]
-    for _, meaning in fixed:
+    declarations = variables(instance) + variables(RunState(instance))
+    names = {name for name, _ in declared_variables(model)}
+    choices = [(name, copy(meaning)) for name, meaning in declarations if meaning.items and name not in names]
+    for _, meaning in choices:
         meaning.items = tuple(item for item in meaning.items if item[1] == meaning.start)
-    return fixed
+    return choices
 
 
 def friction_laws(model: Any) -> list[str]:
@@ -75,18 +75,18 @@ def has_step_events(model: Any) -> bool:
     return hasattr(model, "planar_modes") or any(law != HYBRID_LAW[0] for law in friction_laws(model))
 
 
-def integrated_states(declared: Variables) -> Variables:
+def integrated_states(declarations: Variables) -> Variables:
     """Return the states that a solver integrates, in order of declaration."""
-    return [(name, meaning) for name, meaning in declared if meaning.role == "state" and not meaning.rate]
+    return [(name, meaning) for name, meaning in declarations if meaning.role == "state" and not meaning.rate]
 
 
 def all_variables(model: Any) -> Variables:
     """Return name and declaration of all variables: declared ones, those for model exchange, time."""
-    declared = declared_variables(model)
-    meanings = dict(declared)
-    added: Variables = []
-    forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
-    states = [meaning for _, meaning in integrated_states(declared)]
+    declarations = declared_variables(model)
+    meanings = dict(declarations)
+    additional_variables: Variables = []
+    forces = [meaning.unit for _, meaning in declarations if meaning.role == "contact"]
+    states = [meaning for _, meaning in integrated_states(declarations)]
     speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
     for (mode, slip), force in zip(model.contacts.items(), forces, strict=True):
         tail, of_mode = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
@@ -96,42 +96,44 @@ def all_variables(model: Any) -> Variables:
         if mode in getattr(model, "planar_modes", ()):
             unit, stick_text = "1", f"event indicator{of_mode}: slip, relative to that at the last event; 1 while stuck"
             slip_text = slip_text.replace("1 while sliding", "while sliding, the share of growth left")
-        added += [
+        additional_variables += [
             (TO_REST + tail, ContinuousLocal(unit, stick_text)),
             (TO_BREAK_AWAY + tail, ContinuousLocal(force, slip_text)),
         ]
     for n in range(model.n_event_functions - model.first_condition):
         text = f"event indicator of condition {n + 1}; falls to zero where {model.condition_texts[n]}"
-        added.append((CONDITION.format(n + 1), ContinuousLocal(model.condition_units[n], text)))
-    for name, meaning in declared:
+        additional_variables.append((CONDITION.format(n + 1), ContinuousLocal(model.condition_units[n], text)))
+    for name, meaning in declarations:
         if meaning.rate:
             description = "rate of the " + meaning.text.split(",")[0]
-            added.append((DERIVATIVE_NAME.format(name), ContinuousLocal(meanings[meaning.rate].unit, description)))
-    return [*declared, *added, (TIME, TimeVariable("s", "the independent variable"))]
+            additional_variables.append(
+                (DERIVATIVE_NAME.format(name), ContinuousLocal(meanings[meaning.rate].unit, description))
+            )
+    return [*declarations, *additional_variables, (TIME, TimeVariable("s", "the independent variable"))]
 
 
 def interpolated_inputs(model: Any) -> list[str]:
     """Return the names of inputs whose derivative an importer of FMI 2.0 may set: those that have no declared rate."""
     instance = model()
-    prescribed = [name for name, _ in instance.prescribed_inputs]
+    prescribed_names = [name for name, _ in instance.prescribed_inputs]
     inputs = [name for name, meaning in declared_variables(model) if meaning.causality == "input"]
-    return [name for name in inputs if name not in prescribed and hasattr(instance, f"{name}_polynomial")]
+    return [name for name in inputs if name not in prescribed_names and hasattr(instance, f"{name}_polynomial")]
 
 
-def derivative_indices(declared: Variables) -> dict[int, int]:
+def derivative_indices(declarations: Variables) -> dict[int, int]:
     """Return {index of derivative: index of its state}: states in order of declaration, then drivers."""
-    names = {name: index for index, (name, _) in enumerate(declared)}
-    rates = {names[name]: names[meaning.rate_of] for name, meaning in declared if meaning.rate_of}
-    of_state = {state: rate for rate, state in rates.items() if declared[state][1].role == "state"}
-    drivers = {names[DERIVATIVE_NAME.format(name)]: names[name] for name, meaning in declared if meaning.rate}
-    return {of_state[names[name]]: names[name] for name, _ in integrated_states(declared)} | drivers
+    names = {name: index for index, (name, _) in enumerate(declarations)}
+    rates = {names[name]: names[meaning.rate_of] for name, meaning in declarations if meaning.rate_of}
+    of_state = {state: rate for rate, state in rates.items() if declarations[state][1].role == "state"}
+    drivers = {names[DERIVATIVE_NAME.format(name)]: names[name] for name, meaning in declarations if meaning.rate}
+    return {of_state[names[name]]: names[name] for name, _ in integrated_states(declarations)} | drivers
 
 
-def event_indicator_indices(declared: Variables) -> list[int]:
+def event_indicator_indices(declarations: Variables) -> list[int]:
     """Return the indices of the event indicators: coming to rest, breaking away, conditions."""
     return [
         index
         for start in (TO_REST, TO_BREAK_AWAY, CONDITION[:-2])
-        for index, (name, _) in enumerate(declared)
+        for index, (name, _) in enumerate(declarations)
         if name.startswith(start)
     ]

@@ -71,33 +71,33 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
         Nominal values of the continuous states, if the FMU supports model exchange.
     """
     root = create_root(model, name, "2.0", "guid")
-    exchanging = len(nominals) > 0
-    declared = declared_variables(model)
-    if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
-        declared = [pair for pair in all_variables(model) if pair[0] != TIME]
-        root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
+    has_model_exchange = len(nominals) > 0
+    declarations = declared_variables(model)
+    if has_model_exchange:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
+        declarations = [pair for pair in all_variables(model) if pair[0] != TIME]
+        root.set("numberOfEventIndicators", str(len(event_indicator_indices(declarations))))
         step_report = {} if has_step_events(model) else {"completedIntegratorStepNotNeeded": "true"}
         SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
-    inputs = [name for name, meaning in declared if meaning.causality == "input"]
-    stepping = (
+    inputs = [name for name, meaning in declarations if meaning.causality == "input"]
+    capabilities = (
         STEPPING_CAPABILITIES
-        | (DIRECTIONAL_DERIVATIVES | OUTPUT_DERIVATIVES if exchanging else {})
-        | (INPUT_INTERPOLATION if exchanging and inputs and interpolated_inputs(model) == inputs else {})
+        | (DIRECTIONAL_DERIVATIVES | OUTPUT_DERIVATIVES if has_model_exchange else {})
+        | (INPUT_INTERPOLATION if has_model_exchange and inputs and interpolated_inputs(model) == inputs else {})
     )
-    SubElement(root, "CoSimulation", stepping, modelIdentifier=name)
-    add_units(root, declared)
-    _add_types(root, declared)
+    SubElement(root, "CoSimulation", capabilities, modelIdentifier=name)
+    add_units(root, declarations)
+    _add_types(root, declarations)
     add_log_categories_and_experiment(root, model, "fmi2")
     scalars = SubElement(root, "ModelVariables")
-    positions = {variable: str(number) for number, (variable, _) in enumerate(declared, 1)}
-    for reference, (variable, meaning) in enumerate(declared):
+    positions = {variable: str(number) for number, (variable, _) in enumerate(declarations, 1)}
+    for reference, (variable, meaning) in enumerate(declarations):
         scalar = SubElement(scalars, "ScalarVariable", common_attributes(variable, meaning, reference))
         of_type = SubElement(scalar, meaning.type, type_attributes(variable, meaning))
         if meaning.rate_of:
             of_type.set("derivative", positions[meaning.rate_of])
-    rates = derivative_indices(declared) if exchanging else {}
+    rates = derivative_indices(declarations) if has_model_exchange else {}
     mark_states([scalar[0] for scalar in scalars], model, rates, nominals, first=1)
-    _add_structure(root, model, declared, rates)
+    _add_structure(root, model, declarations, rates)
     return serialize(root, "guid", code, date)
 
 
@@ -128,10 +128,10 @@ def add_log_categories_and_experiment(root: Element, model: type[VariableOwner],
         experiment.set(key, repr(float(getattr(model, attribute))))
 
 
-def add_units(root: Element, declared: Variables) -> None:
+def add_units(root: Element, declarations: Variables) -> None:
     """Add UnitDefinitions for all units in use."""
     definitions = SubElement(root, "UnitDefinitions")
-    for symbol, unit in used_units(declared):
+    for symbol, unit in used_units(declarations):
         powers = {base: str(getattr(unit, base)) for base in BASE_UNITS if getattr(unit, base)}
         element = SubElement(definitions, "Unit", name=symbol)
         SubElement(element, "BaseUnit", powers)
@@ -139,30 +139,30 @@ def add_units(root: Element, declared: Variables) -> None:
             SubElement(element, "DisplayUnit", name=unit.display, factor=repr(unit.factor))
 
 
-def _add_types(root: Element, declared: Variables) -> None:
+def _add_types(root: Element, declarations: Variables) -> None:
     """Add TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
     types = SubElement(root, "TypeDefinitions")
-    for quantity in quantities(declared):
+    for quantity in quantities(declarations):
         element = SubElement(types, "SimpleType", name=quantity["quantity"])
         SubElement(element, "Real", quantity)
-    for name, meaning in declared:
+    for name, meaning in declarations:
         if meaning.items:
             element = SubElement(types, "SimpleType", name=type_name(name), description=meaning.text)
             add_enumeration_items(SubElement(element, "Enumeration"), meaning)
 
 
-def quantities(declared: Variables) -> list[dict[str, str]]:
+def quantities(declarations: Variables) -> list[dict[str, str]]:
     """Return quantity, unit and display unit for every unit in use."""
     quantity_attributes = [
-        {"quantity": u.quantity, "unit": symbol, "displayUnit": u.display} for symbol, u in used_units(declared)
+        {"quantity": u.quantity, "unit": symbol, "displayUnit": u.display} for symbol, u in used_units(declarations)
     ]
     return [{key: value for key, value in attributes.items() if value} for attributes in quantity_attributes]
 
 
-def used_units(declared: Variables) -> list[tuple[str, Unit]]:
+def used_units(declarations: Variables) -> list[tuple[str, Unit]]:
     """Return all units in use: named ones in the order of the table, then the others."""
-    used = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declared if meaning.type == "Real"}
-    return [(symbol, used[symbol]) for symbol in dict.fromkeys((*UNITS, *used)) if symbol in used]
+    units = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declarations if meaning.type == "Real"}
+    return [(symbol, units[symbol]) for symbol in dict.fromkeys((*UNITS, *units)) if symbol in units]
 
 
 def add_enumeration_items(element: Element, meaning: VariableDeclaration) -> None:
@@ -230,7 +230,7 @@ DependencyTable = dict[int, list[int]]  # index of a variable -> indices of the 
 
 
 def dependency_tables(
-    model: type[VariableOwner], declared: Variables, rates: dict[int, int], causalities: tuple[str, ...]
+    model: type[VariableOwner], declarations: Variables, rates: dict[int, int], causalities: tuple[str, ...]
 ) -> list[DependencyTable]:
     """Return the dependencies of outputs and of derivatives after initialization, and of both at initialization.
 
@@ -242,30 +242,30 @@ def dependency_tables(
         Those of the knowns after initialization, besides the states: inputs (FMI 2.0, section 2.2.8), in FMI 3.0 also
         parameters (section 2.4.8).
     """
-    places = {name: place for place, (name, _) in enumerate(declared)}
-    outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
-    driver_rates = {DERIVATIVE_NAME.format(name): [meaning.rate] for name, meaning in declared if meaning.rate}
-    later_knowns = {place for place, (_, meaning) in enumerate(declared) if meaning.causality in causalities}
+    places = {name: place for place, (name, _) in enumerate(declarations)}
+    outputs = [place for place, (_, meaning) in enumerate(declarations) if meaning.causality == "output"]
+    driver_rates = {DERIVATIVE_NAME.format(name): [meaning.rate] for name, meaning in declarations if meaning.rate}
+    later_knowns = {place for place, (_, meaning) in enumerate(declarations) if meaning.causality in causalities}
     tables = []
     for unknowns, at_start, knowns in (
         (outputs, False, later_knowns.union(rates.values())),
         (rates, False, later_knowns.union(rates.values())),
         (sorted({*outputs, *rates}), True, {*places.values()}),
     ):
-        names = output_dependencies(model, declared, at_start) | driver_rates
+        names = output_dependencies(model, declarations, at_start) | driver_rates
         tables.append(
-            {unknown: sorted({places[n] for n in names[declared[unknown][0]]} & knowns) for unknown in unknowns}
+            {unknown: sorted({places[n] for n in names[declarations[unknown][0]]} & knowns) for unknown in unknowns}
         )
     return tables
 
 
-def _add_structure(root: Element, model: type[VariableOwner], declared: Variables, rates: dict[int, int]) -> None:
+def _add_structure(root: Element, model: type[VariableOwner], declarations: Variables, rates: dict[int, int]) -> None:
     """Add ModelStructure: Outputs, Derivatives and InitialUnknowns with their dependencies."""
     structure = SubElement(root, "ModelStructure")
-    outputs, derivatives, at_first = dependency_tables(model, declared, rates, ("input",))
+    outputs, derivatives, at_first = dependency_tables(model, declarations, rates, ("input",))
     kinds = {"Outputs": outputs} | ({"Derivatives": derivatives} if rates else {}) | {"InitialUnknowns": at_first}
     for kind, unknown in kinds.items():
         element = SubElement(structure, kind)
         for place, knowns in unknown.items():
-            dependencies = " ".join(str(known + 1) for known in knowns)  # FMI 2.0 counts from 1
+            dependencies = " ".join(str(index + 1) for index in knowns)  # FMI 2.0 counts from 1
             SubElement(element, "Unknown", index=str(place + 1), dependencies=dependencies)

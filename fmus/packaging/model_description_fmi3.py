@@ -52,62 +52,64 @@ def describe(
     `nominals` are the nominal values of the continuous states.
     """
     root = shared.create_root(model, name, "3.0", "instantiationToken")
-    declared = all_variables(model)
+    declarations = all_variables(model)
     step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(model) else "false"}
     for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
-    shared.add_units(root, declared)
-    _add_types(root, declared)
+    shared.add_units(root, declarations)
+    _add_types(root, declarations)
     shared.add_log_categories_and_experiment(root, model, "fmi3")
-    rates = derivative_indices(declared)
+    rates = derivative_indices(declarations)
     parent, elements = SubElement(root, "ModelVariables"), list[Element]()
-    for reference, (variable, meaning) in enumerate(declared):
+    for reference, (variable, meaning) in enumerate(declarations):
         attributes = shared.common_attributes(variable, meaning, reference) | shared.type_attributes(variable, meaning)
         if meaning.causality in ("input", "output") and meaning.variability == "continuous":
             attributes["intermediateUpdate"] = "true"
         elements.append(SubElement(parent, TYPE_ELEMENTS[meaning.type], attributes))
     shared.mark_states(elements, model, rates, nominals, first=0)
-    _add_structure(root, model, declared, rates)
+    _add_structure(root, model, declarations, rates)
     return shared.serialize(root, "instantiationToken", code, date)
 
 
-def _add_types(root: Element, declared: Variables) -> None:
+def _add_types(root: Element, declarations: Variables) -> None:
     """Add TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
     types = SubElement(root, "TypeDefinitions")
-    for quantity in shared.quantities(declared):
+    for quantity in shared.quantities(declarations):
         SubElement(types, "Float64Type", quantity, name=quantity["quantity"])
-    for name, meaning in declared:
+    for name, meaning in declarations:
         if meaning.items:
             # without its optional description, which fmpy before 0.3.26 cannot read; the variable has the same one
             element = SubElement(types, "EnumerationType", name=shared.type_name(name))
             shared.add_enumeration_items(element, meaning)
 
 
-def _add_structure(root: Element, model: Any, declared: Variables, rates: dict[int, int]) -> None:
+def _add_structure(root: Element, model: Any, declarations: Variables, rates: dict[int, int]) -> None:
     """Add ModelStructure with all dependencies; for smooth models also dependenciesKind constant or tunable."""
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
-    outputs, derivatives, at_first = shared.dependency_tables(model, declared, rates, SETTABLE_CAUSALITIES)
-    for place, known in outputs.items():
-        _add_unknown(structure, "Output", place, known)
-    for place, known in derivatives.items():
+    outputs, derivatives, at_first = shared.dependency_tables(model, declarations, rates, SETTABLE_CAUSALITIES)
+    for place, knowns in outputs.items():
+        _add_unknown(structure, "Output", place, knowns)
+    for place, knowns in derivatives.items():
         kind_of_factors = (
             "" if model.has_dry_friction else "constant" if place in states else "tunable" if model.is_linear else ""
         )
-        kinds = ["dependent" if declared[index][1].causality == "parameter" else kind_of_factors for index in known]
-        _add_unknown(structure, "ContinuousStateDerivative", place, known, kinds if kind_of_factors else [])
-    for place, known in at_first.items():
-        _add_unknown(structure, "InitialUnknown", place, known)
-    places = {name: place for place, (name, _) in enumerate(declared)}
-    inputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "input"]
+        kinds = [
+            "dependent" if declarations[index][1].causality == "parameter" else kind_of_factors for index in knowns
+        ]
+        _add_unknown(structure, "ContinuousStateDerivative", place, knowns, kinds if kind_of_factors else [])
+    for place, knowns in at_first.items():
+        _add_unknown(structure, "InitialUnknown", place, knowns)
+    places = {name: place for place, (name, _) in enumerate(declarations)}
+    inputs = [place for place, (_, meaning) in enumerate(declarations) if meaning.causality == "input"]
     slips = [[places[slip]] if slip else states for slip in model.contacts.values()]
     at_rest = [state for state in states if not model.rests_when_stuck or [state] not in slips]
     slip_of = dict(
-        zip(event_indicator_indices(declared), slips, strict=False)
+        zip(event_indicator_indices(declarations), slips, strict=False)
     )  # indicators of coming to rest are first
-    for place in event_indicator_indices(declared):
-        name, _ = declared[place]
-        known = slip_of[place] if name.startswith(TO_REST) else at_rest if name.startswith(TO_BREAK_AWAY) else states
-        _add_unknown(structure, "EventIndicator", place, known if name.startswith(TO_REST) else known + inputs)
+    for place in event_indicator_indices(declarations):
+        name, _ = declarations[place]
+        knowns = slip_of[place] if name.startswith(TO_REST) else at_rest if name.startswith(TO_BREAK_AWAY) else states
+        _add_unknown(structure, "EventIndicator", place, knowns if name.startswith(TO_REST) else knowns + inputs)
 
 
 def _add_unknown(structure: Element, kind: str, reference: int, knowns: list[int], factors: Sequence[str] = ()) -> None:

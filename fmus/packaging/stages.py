@@ -79,7 +79,7 @@ def expression_lines(analysis: ModelAnalysis) -> Iterator[str]:
 
 def analysis_lines(analysis: ModelAnalysis) -> Iterator[str]:
     """Yield the roles of the variables and the derived expressions."""
-    names = {e: e.name for e in (TIME, *analysis.declared) if not isinstance(e, Output)}
+    names = {e: e.name for e in (TIME, *analysis.variables) if not isinstance(e, Output)}
     printer = ExpressionPrinter(names, (), (), 0)
 
     def text(e: Operand) -> str:

@@ -18,7 +18,7 @@ from ..packaging.native.native_fmu import MAIN_SOURCE, generate_c_sources
 from .model_json import ModelJson, build_model_json
 
 FILE, MORE_FILE = "index.html", "more.html"  # pages of the shipped models and of those in fmus/more
-HERE = Path(__file__).parent
+PAGE_FOLDER = Path(__file__).parent
 MODULES = (
     *("numbers", "libc", "fmu", "state", "run", "library", "run_set", "measure", "plot", "panels", "controls"),
     *("diagrams", "tables", "export", "mechanism", "drag", "scene", "explore"),
@@ -48,15 +48,15 @@ def build(
     file
         Name of the page.
     """
-    models, compiled = [], []
+    models, futures = [], []
     with CompilerPool() as pool:  # for the compiler only: ast.parse may fail in threads of Python 3.11
         for source in sources:
             model, files = model_with_sources(source, methods, laws)
             models.append(model)
-            compiled.append(pool.submit(compile_to_base64, source.name, files))
+            futures.append(pool.submit(compile_to_base64, source.name, files))
     data = {
         "version": __version__,
-        "models": [model | {"code": code.result()} for model, code in zip(models, compiled, strict=True)],
+        "models": [model | {"code": code.result()} for model, code in zip(models, futures, strict=True)],
     }
     is_complete = not methods and not laws and {source.name for source in sources}.issuperset(STORY_MODELS)
     return write(folder / file, render_page(data, with_stories=is_complete).encode())
@@ -73,7 +73,7 @@ def model_with_sources(
 
 def render_page(data: object, with_stories: bool) -> str:
     """Return the HTML text of the page, with the opening and the stories, which need STORY_MODELS, or without."""
-    style, stories = ((HERE / name).read_text(encoding="utf-8") for name in ("style.css", "stories.html"))
+    style, stories = ((PAGE_FOLDER / name).read_text(encoding="utf-8") for name in ("style.css", "stories.html"))
     title = CLAIM if with_stories else "Dry friction, live"
     heading = "<h2>Explore</h2>" if with_stories else f"<h1>{title}</h1>"
     code = bundle_script()
@@ -82,7 +82,7 @@ def render_page(data: object, with_stories: bool) -> str:
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    template = Template((HERE / "page.html").read_text(encoding="utf-8"))
+    template = Template((PAGE_FOLDER / "page.html").read_text(encoding="utf-8"))
     stories = Template(stories).substitute(title=title) if with_stories else ""
     parts = {"title": title, "heading": heading, "stories": stories}
     return template.substitute(policy=policy, style=style, script=code, data=text, **parts)
@@ -90,7 +90,7 @@ def render_page(data: object, with_stories: bool) -> str:
 
 def bundle_script() -> str:
     """Concatenate the JavaScript modules, without their imports and exports."""
-    texts = ((HERE / "script" / f"{name}.js").read_text(encoding="utf-8") for name in MODULES)
+    texts = ((PAGE_FOLDER / "script" / f"{name}.js").read_text(encoding="utf-8") for name in MODULES)
     lines = (line.removeprefix("export ") for text in texts for line in text.splitlines())
     return "\n".join(line for line in lines if not line.startswith("import "))
 
@@ -101,7 +101,7 @@ def csp_hash(text: str) -> str:
 
 
 TARGET = "wasm32-wasi"
-EXPORTED = (  # called by script/fmu.js
+EXPORTED_FUNCTIONS = (  # called by script/fmu.js
     *("fmi2Instantiate", "fmi2Reset", "fmi2SetupExperiment"),
     *("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2DoStep"),
     *("fmi2GetReal", "fmi2GetInteger", "fmi2SetReal", "fmi2SetInteger"),
@@ -109,7 +109,7 @@ EXPORTED = (  # called by script/fmu.js
 # Headers of a C library without the library itself, which the compiler would have to build first: script/libc.js
 # implements the functions.
 HEADERS = [f"-isystem{{compiler}}/lib/libc/include/{kind}-musl" for kind in ("wasm-wasi", "generic")]
-LINK_OPTIONS = ("-Wl,--no-entry", "-Wl,--import-symbols", *(f"-Wl,--export={name}" for name in EXPORTED))
+LINK_OPTIONS = ("-Wl,--no-entry", "-Wl,--import-symbols", *(f"-Wl,--export={name}" for name in EXPORTED_FUNCTIONS))
 OPTIONS = ("-nostdlib", *HEADERS, *LINK_OPTIONS, "-fvisibility=hidden")
 
 

@@ -37,7 +37,7 @@ def build_model_json(source: ModelFile, model: type[VariableOwner]) -> ModelJson
 def variable_json(name: str, meaning: VariableDeclaration) -> ModelJson:
     """Describe a variable. Its value in the unit `display_unit` is `factor` times its value in SI units."""
     unit = unit_of(name, meaning.unit or "1")
-    described = {
+    description = {
         "name": exported_name(name, meaning),
         "symbol": typeset(re.sub(r"(?<=[a-z])0$", "_0", exported_name(name, meaning))),
         "type": meaning.type,
@@ -49,19 +49,19 @@ def variable_json(name: str, meaning: VariableDeclaration) -> ModelJson:
         "unit_exponents": [getattr(unit, base) for base in BASE_UNITS],
         "start": meaning.start,
         "fixed": meaning.variability == "fixed",
-        "allowed": readable_unit(meaning.allowed),
+        "allowed": readable_unit(meaning.allowed_range),
         "items": [{"label": label, "value": value, "text": text} for label, value, text in meaning.items],
     }
     bounds = {"low": meaning.low, "high": meaning.high, "above": meaning.above, "below": meaning.below}
-    return described | {key: bound for key, bound in bounds.items() if isfinite(bound)}
+    return description | {key: bound for key, bound in bounds.items() if isfinite(bound)}
 
 
 def list_bodies(analysis: ModelAnalysis) -> list[ModelJson]:
     """Describe the bodies of a model, one per position; without any, the first state and its derivative."""
-    described = [body_json(analysis, x) for x in analysis.positions]
+    bodies = [body_json(analysis, x) for x in analysis.positions]
     x = analysis.states[0]
     contacts = [c.name for c in analysis.contacts]
-    return described or [{"kind": "none", "position": x.name, "speed": analysis.rate[x].name, "contacts": contacts}]
+    return bodies or [{"kind": "none", "position": x.name, "speed": analysis.rate[x].name, "contacts": contacts}]
 
 
 def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
@@ -69,12 +69,12 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
     v = analysis.rate[x]
     a = next((e for s, e in analysis.rate.items() if s is v), None)
     law: Operand = a.expression if isinstance(a, Output) else 0.0
-    restoring, damping = differentiate(law, {x: 1.0}), differentiate(law, {v: 1.0})
-    is_angle, is_nonlinear = x.unit == "rad", depends_on(restoring, (x,))
+    stiffness, damping = differentiate(law, {x: 1.0}), differentiate(law, {v: 1.0})
+    is_angle, is_nonlinear = x.unit == "rad", depends_on(stiffness, (x,))
     frictions = [c for c in analysis.contacts if depends_on(c.slip, (v,))] or [
         e for e in analysis.outputs if is_friction_force(e, v)
     ]
-    linked = [y.name for y in analysis.positions if y is not x and depends_on(law, (y,))]
+    linked_positions = [y.name for y in analysis.positions if y is not x and depends_on(law, (y,))]
     drives = [d for d in analysis.drivers if pulls_on(law, d, x)]
     slip = v.name if frictions and slips_with(frictions[0], v) else ""
     items = {
@@ -84,8 +84,8 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
         "acceleration": a.name if a is not None else "",
         "driver": next((d.name for d in drives), ""),
         "driver_speed": next((d.constant_rate.name for d in drives), ""),
-        "linked": linked,
-        "spring": not is_nonlinear and not is_same_expression(restoring, 0.0) and bool(drives or not linked),
+        "linked": linked_positions,
+        "spring": not is_nonlinear and not is_same_expression(stiffness, 0.0) and bool(drives or not linked_positions),
         "dampers": [] if depends_on(damping, (v,)) else scaling_parameters(damping),
         "friction": next((e.name for e in frictions), ""),
         "slip": slip,

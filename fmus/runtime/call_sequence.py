@@ -29,13 +29,13 @@ from .vectors import planar_indices
 # ---- values
 
 
-def rejection_reason(run, calculated, fixed, allowed):
+def rejection_reason(run, is_calculated, is_fixed, is_allowed):
     """Return why a value cannot be set, or OK."""
-    if calculated:
+    if is_calculated:
         return CALCULATED
-    if fixed and run.phase >= RUNNING:
+    if is_fixed and run.phase >= RUNNING:
         return FIXED
-    return OK if allowed else OUT_OF_RANGE
+    return OK if is_allowed else OUT_OF_RANGE
 
 
 def note_change(run, model):

@@ -28,14 +28,14 @@ def update_sides(model, location, t, y: StateVector, modes: ContactVector):
         update_margins(model, location, t, y, modes)
         if model.has_pieces:
             model.update_pieces(t, y, modes)
-        changed = False
+        has_changed = False
         for j in range(model.n_switches):
             side = 1.0 if location.margins[j] > 0.0 else -1.0
             if model.has_pieces and model.condition_pieces[j] >= 0.0:
                 side = model.condition_pieces[j]
             if side != model.condition_sides[j]:
-                model.condition_sides[j], changed = side, True
-        if not changed:
+                model.condition_sides[j], has_changed = side, True
+        if not has_changed:
             break
     for j in range(model.n_switches):
         location.sides_after[j] = model.condition_sides[j]
@@ -43,12 +43,15 @@ def update_sides(model, location, t, y: StateVector, modes: ContactVector):
 
 def check_limits(model, location, t, y: StateVector, modes: ContactVector):
     """Note the first limit that does not hold."""
-    location.violated = -1
+    location.violated_limit = -1
     update_margins(model, location, t, y, modes)
     for j in range(model.n_event_functions - model.first_condition - model.n_switches):
         k = model.n_switches + j
-        if location.violated < 0 and location.margins[k] + CONDITION_MARGIN * location.margin_scales[k] + TINY <= 0.0:
-            location.violated = k
+        if (
+            location.violated_limit < 0
+            and location.margins[k] + CONDITION_MARGIN * location.margin_scales[k] + TINY <= 0.0
+        ):
+            location.violated_limit = k
             model.violation_time, model.violation_value = t, location.margins[k]
 
 
@@ -81,16 +84,16 @@ def note_distance(location, j, distance):
     )
 
 
-def stayed_at_edge(model, location, tolerance):
+def has_stayed_at_edge(model, location, tolerance):
     """Return whether a condition that changes has not left its edge by more than the tolerance since it changed."""
-    stayed = False
+    has_stayed = False
     for j in range(model.n_switches):
         if location.sides_after[j] != location.sides_before[j]:
             is_near = location.distances[j] <= tolerance * location.largest_distances[j]
             # the pieces of a table are continuous at their edge
-            stayed = stayed or (is_near and not (model.has_pieces and model.condition_pieces[j] >= 0.0))
+            has_stayed = has_stayed or (is_near and not (model.has_pieces and model.condition_pieces[j] >= 0.0))
             location.distances[j] = 0.0
-    return stayed
+    return has_stayed
 
 
 def count_changes(location, t, is_brief):
@@ -102,7 +105,7 @@ def count_changes(location, t, is_brief):
 
 def violation_status(model, location):
     """Return OK, or the status of the rule for a condition that must hold but does not."""
-    return model.first_limit_rule + location.violated - model.n_switches if location.violated >= 0 else OK
+    return model.first_limit_rule + location.violated_limit - model.n_switches if location.violated_limit >= 0 else OK
 
 
 def select_sides(model, location, after_event):
@@ -113,7 +116,7 @@ def select_sides(model, location, after_event):
 
 def have_changed(model, location):
     """Return whether a condition changes at the end of the step."""
-    changed = False
+    has_changed = False
     for j in range(model.n_switches):
-        changed = changed or location.sides_after[j] != location.sides_before[j]
-    return changed
+        has_changed = has_changed or location.sides_after[j] != location.sides_before[j]
+    return has_changed

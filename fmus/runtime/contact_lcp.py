@@ -206,11 +206,11 @@ def have_jumped(model, step, t, y: StateVector, slips_before: ContactVector):
     slips = model.slip_velocities(t, y)
     terms = model.slip_magnitudes(t, y)
     floors = slip_floors(model, step, t, y)
-    jumped = False
+    has_jumped = False
     for i in contact_indices:
         size = terms[i] + floors[i] + step.event_location.peaks[i]
-        jumped = jumped or fabs(slips[i] - slips_before[i]) > REVERSED_SHARE * size
-    return jumped
+        has_jumped = has_jumped or fabs(slips[i] - slips_before[i]) > REVERSED_SHARE * size
+    return has_jumped
 
 
 def follow_inputs(model, t, y: StateVector, modes: ContactVector, deviations: ContactVector) -> StateVector:
@@ -362,10 +362,10 @@ def solve_modes(
             consistent = True
             break
         release_level = TIE_SHARE * highest if iteration < MAX_JOINT_ITERATIONS else 0.0
-        changed = False
+        has_changed = False
         for i in contact_indices:
-            if violation[i] > 0.0 and violation[i] >= release_level and not (changed and release_level == 0.0):
-                pivot_modes[i], changed = next_modes[i], True
+            if violation[i] > 0.0 and violation[i] >= release_level and not (has_changed and release_level == 0.0):
+                pivot_modes[i], has_changed = next_modes[i], True
                 if next_modes[i] == STUCK:
                     pivot_status[i] = RELOCKED
     n_at_rest = n_released = 0
@@ -381,10 +381,10 @@ def solve_modes(
             return modes, False
         relocked_modes = relock(model, t, y, pivot_modes, status, delta, tie_tolerance)
         return relocked_modes, True
-    best_modes, found = most_held(
+    best_modes, has_solution = most_held(
         model, t, y, modes, status, delta, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
     )
-    if found:
+    if has_solution:
         return best_modes, True
     if consistent:
         return pivot_modes, True

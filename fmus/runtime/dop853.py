@@ -106,12 +106,12 @@ class Dop853:
         self.f6, self.f7, self.f8, self.f9, self.f10, self.f11, self.f12 = f6, f7, f8, f9, f10, f11, f12
         e5 = ER1 * f + ER6 * f6 + ER7 * f7 + ER8 * f8 + ER9 * f9 + ER10 * f10 + ER11 * f11 + ER12 * f12
         e3 = u - BHH1 * f - BHH2 * f9 - BHH3 * f12
-        e = combined(e5, e3)
+        e = combine_errors(e5, e3)
         return y1, f1, e
 
     def build_interpolant(self, model, step):
         """Build the interpolant of the step just computed."""
-        inside = step.interpolant
+        interpolant = step.interpolant
         h, modes, t, y, f, y1, f1 = step.h_full, step.modes0, step.t0, step.y0, step.f0, step.y1, step.f1  # noqa: F841
         if model.has_other_laws and not step.is_hybrid:
             modes = STUCK * modes
@@ -125,20 +125,20 @@ class Dop853:
         u = A161 * f + A166 * f6 + A167 * f7 + A168 * f8
         y16 = y + h * (u + A169 * f9 + A1613 * f1 + A1614 * f14 + A1615 * f15)
         f16 = model.rates(t + C16 * h, y16, modes)
-        inside.set_hermite_cubic(step)
-        inside.degree = 7
+        interpolant.set_hermite_cubic(step)
+        interpolant.degree = 7
         u = D41 * f + D46 * f6 + D47 * f7 + D48 * f8 + D49 * f9 + D410 * f10
-        inside.c4 = h * (u + D411 * f11 + D412 * f12 + D413 * f1 + D414 * f14 + D415 * f15 + D416 * f16)
+        interpolant.c4 = h * (u + D411 * f11 + D412 * f12 + D413 * f1 + D414 * f14 + D415 * f15 + D416 * f16)
         u = D51 * f + D56 * f6 + D57 * f7 + D58 * f8 + D59 * f9 + D510 * f10
-        inside.c5 = h * (u + D511 * f11 + D512 * f12 + D513 * f1 + D514 * f14 + D515 * f15 + D516 * f16)
+        interpolant.c5 = h * (u + D511 * f11 + D512 * f12 + D513 * f1 + D514 * f14 + D515 * f15 + D516 * f16)
         u = D61 * f + D66 * f6 + D67 * f7 + D68 * f8 + D69 * f9 + D610 * f10
-        inside.c6 = h * (u + D611 * f11 + D612 * f12 + D613 * f1 + D614 * f14 + D615 * f15 + D616 * f16)
+        interpolant.c6 = h * (u + D611 * f11 + D612 * f12 + D613 * f1 + D614 * f14 + D615 * f15 + D616 * f16)
         u = D71 * f + D76 * f6 + D77 * f7 + D78 * f8 + D79 * f9 + D710 * f10
-        inside.c7 = h * (u + D711 * f11 + D712 * f12 + D713 * f1 + D714 * f14 + D715 * f15 + D716 * f16)
+        interpolant.c7 = h * (u + D711 * f11 + D712 * f12 + D713 * f1 + D714 * f14 + D715 * f15 + D716 * f16)
 
 
 @elementwise
-def combined(fifth, third):
+def combine_errors(fifth, third):
     """Combine the errors of the embedded formulas of orders 5 and 3 into the estimate of DOP853, per unit of h."""
     size = fifth * fifth + 0.01 * third * third
     return fifth * fifth / sqrt(size) if size != 0.0 else 0.0

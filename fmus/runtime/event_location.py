@@ -58,7 +58,7 @@ class EventLocation:
         self.t_condition = -inf  # time of the last change of a condition
         self.n_chatter = 0  # changes of a condition in brief succession
         self.distances, self.largest_distances = [0.0] * n, [0.0] * n  # from its edge: since its last change; ever
-        self.violated = -1  # condition that must hold but does not; -1 if there is none
+        self.violated_limit = -1  # condition that must hold but does not; -1 if there is none
         # nodes (fractions of a step) of the polynomial through an event function, and its coefficients
         self.nodes, self.samples, self.polynomial = [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1)
         for k in range(DEGREE + 1):
@@ -127,12 +127,12 @@ def locate_events(model, step):
     for j in range(n):
         location.times[j] = inf
         if model.has_pieces and is_edge(model, j):
-            found = examine_edge(location, step, j)
+            n_zeros = examine_edge(location, step, j)
         else:
-            found = examine_cubic(location, step, j)
-        if found == ONE_ZERO:
+            n_zeros = examine_cubic(location, step, j)
+        if n_zeros == ONE_ZERO:
             location.times[j] = find_root(model, step, step.h_full, location.start[j], location.end[j], j)
-        elif found == UNKNOWN:
+        elif n_zeros == UNKNOWN:
             location.times[j] = search_polynomial(model, step, j)
         if location.times[j] < first:
             first = location.times[j]
@@ -201,8 +201,8 @@ def examine_cubic(location, step, j):
         if location.must_search:
             return UNKNOWN
         low = smallest_of(start, early, late, end)
-        inside = late if start <= 0.0 or late < early else early  # a slip starts at zero
-        return NO_ZERO if inside >= INTERPOLANT_SHARE * (high - low) else UNKNOWN
+        coefficient = late if start <= 0.0 or late < early else early  # a slip starts at zero
+        return NO_ZERO if coefficient >= INTERPOLANT_SHARE * (high - low) else UNKNOWN
     return UNKNOWN if start > 0.0 and early < INTERPOLANT_SHARE * (high - end) and late > early else ONE_ZERO
 
 
@@ -217,9 +217,9 @@ def examine_edge(location, step, j):
     The table is continuous at the edge, so that an edge in doubt does not change the motion by more than the tolerance.
     """
     in_doubt = location.in_doubt
-    found = examine_cubic(location, step, j)
+    n_zeros = examine_cubic(location, step, j)
     location.in_doubt = in_doubt
-    return found
+    return n_zeros
 
 
 def search_polynomial(model, step, j):

@@ -89,11 +89,11 @@ class FailureHandling:
 
     def set_outputs_to_nan(self) -> None:
         """Set every calculated Real to NaN, and every output that is an integer to a value that is no mode."""
-        for (_, declared), (owner, name) in zip(self.variables, self.attribute_owners):
-            if lacks_value_after_failure(declared):
-                setattr(owner, name, NO_VALUE if declared.is_integer else nan)
+        for (_, declaration), (owner, name) in zip(self.variables, self.attribute_owners):
+            if lacks_value_after_failure(declaration):
+                setattr(owner, name, NO_VALUE if declaration.is_integer else nan)
 
 
-def lacks_value_after_failure(declared: VariableDeclaration) -> bool:
+def lacks_value_after_failure(declaration: VariableDeclaration) -> bool:
     """Return whether a variable has no value after a failure: calculated Reals and outputs, but no counter."""
-    return declared.causality == "output" or (declared.causality == "local" and declared.type == "Real")
+    return declaration.causality == "output" or (declaration.causality == "local" and declaration.type == "Real")

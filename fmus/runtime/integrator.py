@@ -187,7 +187,7 @@ class Integrator(VariableOwner):
             if model.has_conditions:
                 conditions.select_sides(model, step.event_location, False)
             interpolant = step.interpolant
-            if interpolant.ready:  # as in step.state_at; saves one call in limit communication steps
+            if interpolant.is_ready:  # as in step.state_at; saves one call in most communication steps
                 self.y = interpolant.evaluate(t - step.t0 - step.roundoff.t0)
                 return OK
             self.y = step.state_at(model, t)

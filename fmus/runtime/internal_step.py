@@ -102,7 +102,7 @@ class InternalStep:
         self.save_counters()
         self.t0, self.y0 = self.t1, self.y1
         self.f0, self.modes0 = self.f1, self.modes1
-        self.is_stuck = self.interpolant.ready = False
+        self.is_stuck = self.interpolant.is_ready = False
 
     def save_counters(self):
         """Save the counters at t1, where the next step starts."""
@@ -132,7 +132,7 @@ class InternalStep:
     def state_at(self, model, t) -> StateVector:
         """Interpolate the state at t inside the step."""
         interpolant = self.interpolant
-        if not interpolant.ready:
+        if not interpolant.is_ready:
             if model.rests_when_stuck and self.is_stuck:
                 return self.y1
             if follows_closed_form(model, self):
@@ -142,6 +142,6 @@ class InternalStep:
 
     def state_after(self, model, elapsed) -> StateVector:
         """Interpolate the state `elapsed` seconds after the start of a step of a method."""
-        if not self.interpolant.ready:
+        if not self.interpolant.is_ready:
             self.active_method.build_interpolant(model, self)
         return self.interpolant.evaluate(elapsed)

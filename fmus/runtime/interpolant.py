@@ -12,7 +12,7 @@ from .vectors import StateVector
 
 
 class Interpolant:
-    """Coefficients for a step of size `h`; valid once `ready` is set."""
+    """Coefficients for a step of size `h`; valid once `is_ready` is set."""
 
     c0: StateVector
     c1: StateVector
@@ -24,7 +24,7 @@ class Interpolant:
     c7: StateVector
 
     def __init__(self):
-        self.ready = False
+        self.is_ready = False
         self.h = 0.0
         self.degree = 3
         self.n_event_evals = 0  # evaluations of event functions inside the step
@@ -33,7 +33,7 @@ class Interpolant:
     def set_hermite_cubic(self, step):
         """Set the cubic Hermite interpolant through the values and slopes at both ends of a step."""
         h = step.h_full
-        self.ready, self.h, self.degree = True, h, 3
+        self.is_ready, self.h, self.degree = True, h, 3
         c1 = step.y1 - step.y0
         self.c0, self.c1 = step.y0, c1
         self.c2 = h * step.f0 - c1
@@ -41,7 +41,7 @@ class Interpolant:
 
     def set_line(self, step):
         """Set the straight line between both ends of a step."""
-        self.ready, self.h, self.degree = True, step.h_full, 3
+        self.is_ready, self.h, self.degree = True, step.h_full, 3
         self.c0, self.c1 = step.y0, step.y1 - step.y0
         self.c2 = self.c3 = 0.0
 

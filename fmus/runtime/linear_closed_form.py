@@ -420,11 +420,11 @@ def free_standstill(v, a, q):
     return first if first > 0.0 else inf
 
 
-def half_angle(over, under):
-    """Return the angle in (0, pi] whose tangent is over/under; a tangent of zero gives pi."""
-    if under < over < 0.0:  # a small angle, which would lose its digits below
-        over, under = -over, -under
-    y = atan2(over, under)
+def half_angle(numerator, denominator):
+    """Return the angle in (0, pi] whose tangent is numerator/denominator; a tangent of zero gives pi."""
+    if denominator < numerator < 0.0:  # a small angle, which would lose its digits below
+        numerator, denominator = -numerator, -denominator
+    y = atan2(numerator, denominator)
     if y <= 0.0:
         y += pi
     return y if y > 0.0 else pi

@@ -7,7 +7,7 @@ later pivot by a large multiple of that, a ratio without units.  A smaller h bri
 The functions run on numbers, in tests, and at build time on names, which gives the statements of an FMU
 (compiler/lowering/elimination.py).  Vectors are dictionaries by index of a state, matrices by row and column; what is
 always zero is missing.  In a chain of n bodies this leaves out most of n^3 operations, and it changes no number.
-`computed` are the states whose rate is computed; `moved` maps each other state to the one that is its rate.
+`dynamic_states` are those whose rate is computed; `kinematic_states` maps each other state to the one that is its rate.
 """
 
 from math import nan
@@ -42,27 +42,27 @@ class Complex:
     def __mul__(self, other):
         return Complex(self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re)
 
-    def squared(self):
+    def squared_magnitude(self):
         """Return the square of the magnitude."""
         return self.re * self.re + self.im * self.im
 
 
-def factorize(w, g, h, J, computed, moved):
+def factorize(w, g, h, J, dynamic_states, kinematic_states):
     """Factorize 1 - g h J into the entries w; inverse pivots, times g, take the place of the pivots."""
-    for i in computed:
-        for p in moved:
+    for i in dynamic_states:
+        for p in kinematic_states:
             if (i, p) in J:
                 w[i, p] = g * h * J[i, p]
-        for j in computed:
+        for j in dynamic_states:
             terms = [J[i, j]] if (i, j) in J else []
-            terms += [w[i, p] for p, rate in moved.items() if rate == j and (i, p) in J]
+            terms += [w[i, p] for p, rate in kinematic_states.items() if rate == j and (i, p) in J]
             if i == j:
                 w[i, j] = 1.0 - g * h * total(terms)
             elif terms:
                 w[i, j] = -g * h * total(terms)
-    for n, k in enumerate(computed):
-        below = [i for i in computed[n + 1 :] if (i, k) in w]
-        right = [j for j in computed[n + 1 :] if (k, j) in w]
+    for n, k in enumerate(dynamic_states):
+        below = [i for i in dynamic_states[n + 1 :] if (i, k) in w]
+        right = [j for j in dynamic_states[n + 1 :] if (k, j) in w]
         tests = [abs(w[k, k] * w[i, i]) >= SMALL * abs(w[i, k] * w[k, i]) for i in below if i in right]
         w[k, k] = w.quotient_if([*tests, w[k, k] != 0.0], g, w[k, k])
         for i in below:
@@ -73,30 +73,30 @@ def factorize(w, g, h, J, computed, moved):
             w[k, j] = w[k, j] / g
 
 
-def solve(k, w, g, h, r, computed, moved):
+def solve(k, w, g, h, r, dynamic_states, kinematic_states):
     """Solve for k, given the factorized matrix."""
-    for n, i in enumerate(computed):
+    for n, i in enumerate(dynamic_states):
         b = r[i]
-        for p in moved:
+        for p in kinematic_states:
             if (i, p) in w and p in r:
                 b = b + w[i, p] * r[p]
-        b = subtract_products(b, w, i, k, computed[:n])
-        k[i] = b * w[i, i] if i == computed[-1] else b
-    for n, i in reversed(list(enumerate(computed[:-1]))):
-        k[i] = subtract_products(k[i], w, i, k, computed[n + 1 :]) * w[i, i]
-    for p, rate in moved.items():
+        b = subtract_products(b, w, i, k, dynamic_states[:n])
+        k[i] = b * w[i, i] if i == dynamic_states[-1] else b
+    for n, i in reversed(list(enumerate(dynamic_states[:-1]))):
+        k[i] = subtract_products(k[i], w, i, k, dynamic_states[n + 1 :]) * w[i, i]
+    for p, rate in kinematic_states.items():
         k[p] = g * (r[p] + h * k[rate]) if p in r else g * (h * k[rate])
 
 
-def factorize_complex(w, re, im, J, computed, moved):
+def factorize_complex(w, re, im, J, dynamic_states, kinematic_states):
     """Factorize re + i im - J into the entries w; inverse pivots take the place of the pivots."""
     ratio = w.store("ratio", im / re)  # for the reciprocal of the shift without squares, which may underflow
     real = w.store("real", 1.0 / (re + im * ratio))
     imaginary = w.store("imaginary", -ratio * real)
-    for i in computed:
-        for j in computed:
+    for i in dynamic_states:
+        for j in dynamic_states:
             direct = [J[i, j]] if (i, j) in J else []
-            others = [J[i, p] for p, rate in moved.items() if rate == j and (i, p) in J]
+            others = [J[i, p] for p, rate in kinematic_states.items() if rate == j and (i, p) in J]
             entry = Complex(
                 total([*direct, *(real * slope for slope in others)]),
                 total([imaginary * slope for slope in others]),
@@ -105,12 +105,13 @@ def factorize_complex(w, re, im, J, computed, moved):
                 w[i, j] = Complex(re, im) - entry
             elif direct or others:
                 w[i, j] = -entry
-    for n, k in enumerate(computed):
-        below = [i for i in computed[n + 1 :] if (i, k) in w]
-        right = [j for j in computed[n + 1 :] if (k, j) in w]
-        size = w.store("size", w[k, k].squared())
+    for n, k in enumerate(dynamic_states):
+        below = [i for i in dynamic_states[n + 1 :] if (i, k) in w]
+        right = [j for j in dynamic_states[n + 1 :] if (k, j) in w]
+        size = w.store("size", w[k, k].squared_magnitude())
         tests = [
-            size * w[i, i].squared() >= SMALL * SMALL * (w[i, k].squared() * w[k, i].squared())
+            size * w[i, i].squared_magnitude()
+            >= SMALL * SMALL * (w[i, k].squared_magnitude() * w[k, i].squared_magnitude())
             for i in below
             if i in right
         ]
@@ -122,13 +123,13 @@ def factorize_complex(w, re, im, J, computed, moved):
                 w[i, j] = difference(w, (i, j), w[i, k] * w[k, j])
 
 
-def solve_complex(u, w, r, computed):
+def solve_complex(u, w, r, dynamic_states):
     """Solve for u, given the factorized matrix; r is zero for states whose rate is a state, and u has no such part."""
-    for n, i in enumerate(computed):
-        b = subtract_products(r[i], w, i, u, computed[:n])
-        u[i] = b * w[i, i] if i == computed[-1] else b
-    for n, i in reversed(list(enumerate(computed[:-1]))):
-        u[i] = subtract_products(u[i], w, i, u, computed[n + 1 :]) * w[i, i]
+    for n, i in enumerate(dynamic_states):
+        b = subtract_products(r[i], w, i, u, dynamic_states[:n])
+        u[i] = b * w[i, i] if i == dynamic_states[-1] else b
+    for n, i in reversed(list(enumerate(dynamic_states[:-1]))):
+        u[i] = subtract_products(u[i], w, i, u, dynamic_states[n + 1 :]) * w[i, i]
 
 
 def total(terms):

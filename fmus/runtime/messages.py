@@ -104,8 +104,12 @@ def inconsistent_rate_message(run: RunState, model: Any) -> str:
     return INCONSISTENT_RATE.format(name=name, rate=rate, now=run.solver.start_time + run.solver.t)
 
 
-def value_message(reason: int, name: str, declared: VariableDeclaration, value: float) -> str:
+def value_message(reason: int, name: str, declaration: VariableDeclaration, value: float) -> str:
     """Return the message for a value that the declared variable `name` rejects."""
     return VALUE_MESSAGES[reason].format(
-        name=name, value=repr(value), unit=declared.unit_suffix, text=declared.text, allowed=declared.allowed
+        name=name,
+        value=repr(value),
+        unit=declaration.unit_suffix,
+        text=declaration.text,
+        allowed=declaration.allowed_range,
     )

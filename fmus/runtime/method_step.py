@@ -99,9 +99,9 @@ def accept_proposal(model, step):
         h = step_limits.limit_proposal(model, step, modes, h)
     if h < h_min:
         h = h_min
-    remaining = step.t_end - t - roundoff.t0
-    last = 1.1 * h >= remaining
-    h = remaining if last else h
+    remaining_time = step.t_end - t - roundoff.t0
+    last = 1.1 * h >= remaining_time
+    h = remaining_time if last else h
     scale = error_size(y)
     method.raise_scale_floor(model, scale)
     scale = elementwise_max(method.error_scale_floor, scale)
@@ -238,7 +238,7 @@ def end_at_first_event(model, step):
         if location.must_shorten:
             return NEEDS_REPETITION
     end = event_location.locate_events(model, step)
-    if step.interpolant.ready:  # the event search built the interpolant
+    if step.interpolant.is_ready:  # the event search built the interpolant
         step.n_rhs += step.active_method.extra
     phase_repetition.decide_repetition(step)
     if location.must_repeat:

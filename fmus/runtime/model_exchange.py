@@ -38,7 +38,7 @@ from .vectors import (
 )
 
 OVERSHOOT_TOLERANCE = 0.1  # slip velocities of the wrong sign up to this share of their terms are overshoot
-UNLIMITED = 1e300  # the same for slips of which the importer has seen that they are overshoot
+UNLIMITED_TOLERANCE = 1e300  # the same for slips of which the importer has seen that they are overshoot
 INDICATOR_OFFSET = 4.0 * EPSILON  # relative to the limit, or to the terms of a slip
 TINY = 1e-300  # absolute offset of velocities and forces
 DEFAULT_NOMINAL = 1e-3  # nominal position (m, rad) and velocity (m/s, rad/s) by default
@@ -351,7 +351,7 @@ def update_modes(run, model):
     solver = run.solver
     exchange = run.model_exchange
     tie_tolerance = TIE_FACTOR * solver.step.tolerance
-    needs_restart = changed = False
+    needs_restart = has_changed = False
     step = solver.step
     if model.is_coupled:
         y = contact_lcp.follow_inputs(model, solver.t, solver.y, solver.modes, exchange.slip_errors)
@@ -362,7 +362,7 @@ def update_modes(run, model):
         y, modes, step.event_location.has_consistent_modes = contact_lcp.resolve_at_start(
             model, step, solver.t, y, solver.modes, tie_tolerance, overshoot_share(run, model, y)
         )
-        needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
+        needs_restart, has_changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes
         for i in planar_indices:
             if planar_contact.begin_phase(model, step, solver.t, y, modes, i):
@@ -382,15 +382,15 @@ def update_modes(run, model):
                     if load * rate > 0.0 and limit - fabs(load) <= tie_tolerance * limit:
                         solver.modes[i] = 1 if rate > 0.0 else -1
                 if solver.modes[i] != last_mode:
-                    changed = True
+                    has_changed = True
                     if solver.modes[i] != STUCK and solver.y[slip_index[i]] == 0.0:
                         step.event_location.has_consistent_modes = stick_slip.is_consistent(
                             model, solver.t, solver.y, solver.modes, i
                         )
-    if changed:
+    if has_changed:
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t
-    return needs_restart or changed
+    return needs_restart or has_changed
 
 
 def overshoot_share(run, model, y: StateVector):
@@ -404,7 +404,7 @@ def overshoot_share(run, model, y: StateVector):
         is_against = run.solver.modes[i] * slips[i] < 0.0
         if is_against and (is_planar[i] or fabs(slips[i]) > run.model_exchange.slip_errors[i]):
             return OVERSHOOT_TOLERANCE
-    return UNLIMITED
+    return UNLIMITED_TOLERANCE
 
 
 def next_breakaway(model, solver):

@@ -58,8 +58,8 @@ class Ode45:
 
     def build_interpolant(self, model, step):
         """Build the interpolant: the cubic Hermite polynomial plus D s^2 (1 - s)^2."""
-        inside = step.interpolant
-        inside.set_hermite_cubic(step)
-        inside.degree = 4
+        interpolant = step.interpolant
+        interpolant.set_hermite_cubic(step)
+        interpolant.degree = 4
         c4 = D1 * step.f0 + D3 * self.f3 + D4 * self.f4 + D5 * self.f5 + D6 * self.f6 + D7 * step.f1
-        inside.c4 = step.h_full * c4
+        interpolant.c4 = step.h_full * c4

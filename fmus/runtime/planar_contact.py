@@ -36,7 +36,7 @@ FIRST_SHARE = 1e-12  # of the first step after a break-away: duration after whic
 ROUNDING_SHARE = 1e-12  # of the largest slip since the last event; a smaller one is a rounding error
 ERROR_SHARE = 1e-3  # of the slip, by which errors may change it in a step
 SMALLEST_TOLERANCE = 1e-13  # lower ones are rounding errors
-RESOLVED = 100.0  # shortest steps in which a slip vanishes that a method can resolve
+RESOLVED_STEPS = 100.0  # shortest steps in which a slip vanishes that a method can resolve
 CONSTANT_SHARE = 0.01  # of the excess of friction over load, by which the load may change up to the rest
 # Model exchange
 BEGINNING, RESTING, PASSING = 2, 3, 4  # phases of a slip; its mode at trial points, with a sign
@@ -187,13 +187,13 @@ def tighten_tolerance(model, step, modes: ContactVector, i: ContactIndex):
         return
     method = step.active_method
     y2 = model.rate_magnitudes(step.t0, step.y0, modes)
-    least = RESOLVED * TIME_RESOLUTION * step.t0 * y2
+    least = RESOLVED_STEPS * TIME_RESOLUTION * step.t0 * y2
     method.error_scale_floor = elementwise_max(method.error_scale_floor, least)
     y2 = error_size(step.y0)
     y2 = elementwise_max(method.error_scale_floor, y2)
     scales = model.slip_magnitudes(step.t0, y2)
     load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
-    if size < RESOLVED * TIME_RESOLUTION * step.t0 * friction[i]:
+    if size < RESOLVED_STEPS * TIME_RESOLUTION * step.t0 * friction[i]:
         return
     finer = ERROR_SHARE * size / scales[i]
     if load < friction[i] and model.run_tolerance * (1.0 - load / friction[i]) < finer:
@@ -239,8 +239,10 @@ def time_to_rest(model, step, i: ContactIndex):
     load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
     floors = contact_lcp.slip_floors(model, step, step.t0, step.y0)
     peak = location.peaks[i] if location.peaks[i] > floors[i] else floors[i]
-    unresolved = RESOLVED * TIME_RESOLUTION * step.t0 * friction[i]  # steps in which friction turns it are too short
-    if (size > step.tolerance * peak and size > unresolved) or not load < friction[i]:
+    unresolved_slip = (
+        RESOLVED_STEPS * TIME_RESOLUTION * step.t0 * friction[i]
+    )  # steps in which friction turns it are too short
+    if (size > step.tolerance * peak and size > unresolved_slip) or not load < friction[i]:
         return inf
     duration = size * (friction[i] + along) / ((friction[i] - load) * (friction[i] + load))
     y2 = step.y0 + duration * step.f0
@@ -248,7 +250,7 @@ def time_to_rest(model, step, i: ContactIndex):
     change = sqrt(
         (load_x2[i] - load_x[i]) * (load_x2[i] - load_x[i]) + (load_y2[i] - load_y[i]) * (load_y2[i] - load_y[i])
     )
-    share = CONSTANT_SHARE if size > unresolved else 1.0
+    share = CONSTANT_SHARE if size > unresolved_slip else 1.0
     is_constant = change <= share * (friction[i] - load)
     return duration if is_constant and step.t0 + duration < step.t_end else inf
 

@@ -65,8 +65,8 @@ def release_libraries() -> None:
     """Call the finalizer of each library that is still mapped; asking the loader would block inside dlclose."""
     if not finalizers:
         return
-    with open("/proc/self/maps", encoding="utf-8", errors="replace") as mapped:
-        for line in mapped:
+    with open("/proc/self/maps", encoding="utf-8", errors="replace") as maps:
+        for line in maps:
             span, *_, path = line.rstrip("\n").split(maxsplit=5)
             low, high = (int(bound, 16) for bound in span.split("-"))
             address = finalizers.get(path.replace(" (deleted)", ""), 0)
@@ -89,8 +89,8 @@ def signal_safe(function: Any) -> Any:
     if table:
         start, at = _read_varint(table, 0)
         length, at = _read_varint(table, at)
-        covered = bytes([0x80]) + _write_varint(start + length)
-        function.__code__ = function.__code__.replace(co_exceptiontable=covered + table[at:])
+        outermost_range = bytes([0x80]) + _write_varint(start + length)
+        function.__code__ = function.__code__.replace(co_exceptiontable=outermost_range + table[at:])
     return function
 
 
@@ -117,10 +117,10 @@ def reraise_later(error: BaseException, message: object) -> object:
     Python code of the FMU may run until then, so the callback consists of C functions only.
     """
     error.__traceback__ = None
-    again = type(type(error).__name__, (type(error),), {"__new__": lambda cls: error})
+    error_class = type(type(error).__name__, (type(error),), {"__new__": lambda cls: error})
     raise_in = pythonapi["PyThreadState_SetAsyncExc"]
     raise_in.argtypes = c_ulong, py_object, py_object  # the last one is the dead weak reference, which C ignores
-    return ref(message, partial(raise_in, get_ident(), again))
+    return ref(message, partial(raise_in, get_ident(), error_class))
 
 
 def compensate_references(fmu_class: type, instances: Iterable[Any]) -> None:
@@ -129,8 +129,8 @@ def compensate_references(fmu_class: type, instances: Iterable[Any]) -> None:
     In a class method, the instance whose references it releases is unknown: pass all.
     """
     for instance in instances:
-        for released in (instance, instance._get_log_queue()):
-            pythonapi["Py_IncRef"](py_object(released))
+        for released_object in (instance, instance._get_log_queue()):
+            pythonapi["Py_IncRef"](py_object(released_object))
     pythonapi["Py_IncRef"](py_object(fmu_class))
 
 

@@ -321,7 +321,7 @@ class Radau9:
 
     def build_interpolant(self, model, step):
         """Build the interpolant: the polynomial through the stages."""
-        inside = step.interpolant
+        interpolant = step.interpolant
         h = step.h_full
         z1 = stage_change(h, step.f0, C1, A11, A12, A13, A14, A15, self.z1, self.z2, self.z3, self.z4, self.z5, self.z1)
         z2 = stage_change(h, step.f0, C2, A21, A22, A23, A24, A25, self.z1, self.z2, self.z3, self.z4, self.z5, self.z2)
@@ -330,11 +330,11 @@ class Radau9:
         z5 = stage_change(
             h, step.f0, 1.0, A51, A52, A53, A54, A55, self.z1, self.z2, self.z3, self.z4, self.z5, self.z5
         )
-        inside.ready, inside.h, inside.degree = True, h, 7
-        inside.c0 = step.y0
-        inside.c1 = step.y1 - step.y0
-        inside.c2 = H21 * z1 + H22 * z2 + H23 * z3 + H24 * z4 + H25 * z5
-        inside.c3 = H31 * z1 + H32 * z2 + H33 * z3 + H34 * z4 + H35 * z5
-        inside.c4 = H41 * z1 + H42 * z2 + H43 * z3 + H44 * z4 + H45 * z5
-        inside.c5 = H51 * z1 + H52 * z2 + H53 * z3 + H54 * z4 + H55 * z5
-        inside.c6 = inside.c7 = 0.0
+        interpolant.is_ready, interpolant.h, interpolant.degree = True, h, 7
+        interpolant.c0 = step.y0
+        interpolant.c1 = step.y1 - step.y0
+        interpolant.c2 = H21 * z1 + H22 * z2 + H23 * z3 + H24 * z4 + H25 * z5
+        interpolant.c3 = H31 * z1 + H32 * z2 + H33 * z3 + H34 * z4 + H35 * z5
+        interpolant.c4 = H41 * z1 + H42 * z2 + H43 * z3 + H44 * z4 + H45 * z5
+        interpolant.c5 = H51 * z1 + H52 * z2 + H53 * z3 + H54 * z4 + H55 * z5
+        interpolant.c6 = interpolant.c7 = 0.0

@@ -97,12 +97,12 @@ class Rodas:
 
     def build_interpolant(self, model, step):
         """Build the interpolant; the end slopes are unusable where the problem is stiff."""
-        inside = step.interpolant
-        inside.set_hermite_cubic(step)
+        interpolant = step.interpolant
+        interpolant.set_hermite_cubic(step)
         h = step.h_full
-        inside.c2 = select_kinematic(
-            inside.c2, h * (H21 * self.k1 + H22 * self.k2 + H23 * self.k3 + H24 * self.k4 + H25 * self.k5)
+        interpolant.c2 = select_kinematic(
+            interpolant.c2, h * (H21 * self.k1 + H22 * self.k2 + H23 * self.k3 + H24 * self.k4 + H25 * self.k5)
         )
-        inside.c3 = select_kinematic(
-            inside.c3, h * (H31 * self.k1 + H32 * self.k2 + H33 * self.k3 + H34 * self.k4 + H35 * self.k5)
+        interpolant.c3 = select_kinematic(
+            interpolant.c3, h * (H31 * self.k1 + H32 * self.k2 + H33 * self.k3 + H34 * self.k4 + H35 * self.k5)
         )

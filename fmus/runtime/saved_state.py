@@ -137,13 +137,13 @@ class SavedStateAccess(VariableAccess):
     @signal_safe
     def _set_fmu_state(self, state: Any) -> None:
         try:
-            own = type(state) is dict and state.get("origin") == __name__
-            if own:
+            is_own = type(state) is dict and state.get("origin") == __name__
+            if is_own:
                 self.restore(state)
         except BaseException as error:  # as in slave.py
             self.handle_exception(error)
         else:
-            if not own:
+            if not is_own:
                 write_to_stderr(f"{type(self).__name__} ({self.instance_name}): {INVALID_STATE_MESSAGE}")
                 compensate_references(type(self), [self])
                 raise InvalidStateError

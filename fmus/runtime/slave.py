@@ -32,12 +32,12 @@ def make_slave_class(model: type[VariableOwner]) -> Any:
     A temporary instance is inspected for the variables: CPython 3.11 reads attributes half as fast once __dict__ of an
     object has been accessed, so that of a running instance is never accessed.
     """
-    inspected = model()
-    run = RunState(inspected)
+    instance = model()
+    run = RunState(instance)
     attributes = {
         "Model": model,
-        "variables": fmi_variables(inspected, run),
-        "model_tree": attribute_tree(inspected),
+        "variables": fmi_variables(instance, run),
+        "model_tree": attribute_tree(instance),
         "run_tree": attribute_tree(run),
         "__module__": __name__,
     }

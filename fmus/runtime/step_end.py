@@ -89,11 +89,11 @@ def is_brief_change(model, step, t):
     Rounding errors decide changes that follow each other faster than they are located in a step.
     """
     dwell = t - step.event_location.t_condition
-    stayed = conditions.stayed_at_edge(model, step.event_location, step.tolerance)
-    if stayed:
+    has_stayed = conditions.has_stayed_at_edge(model, step.event_location, step.tolerance)
+    if has_stayed:
         rate = time_scale.smooth_rate(model, step.t0, step.y0, step.f0, step.modes0)
-        stayed = dwell * rate < conditions.BRIEF_SHARE
-    return stayed or dwell <= conditions.RESOLUTION * step.h_full
+        has_stayed = dwell * rate < conditions.BRIEF_SHARE
+    return has_stayed or dwell <= conditions.RESOLUTION * step.h_full
 
 
 def end_at_event(model, step):

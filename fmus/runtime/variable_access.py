@@ -102,21 +102,22 @@ class VariableAccess(FailureHandling):
         """
         key = kind, *references
         if key in self.readers:
-            cached: tuple[list[int], Any, bool, bool] = self.readers[key]
-            self.last_readers[kind] = cached
-            return cached
+            entry: tuple[list[int], Any, bool, bool] = self.readers[key]
+            self.last_readers[kind] = entry
+            return entry
         is_known = [self.has_type(kind, reference) for reference in references]
-        names = [self.variables[reference][0] if known else "" for reference, known in zip(references, is_known)]
+        names = [self.variables[reference][0] if is_valid else "" for reference, is_valid in zip(references, is_known)]
         owners = ["run" if "." in name else "model" for name in names]
         terms = [f"{owner}.{name}" if name else "blank" for owner, name in zip(owners, names)]
         if kind == "Real":
             integers = [
-                known and self.variables[reference][1].is_integer for reference, known in zip(references, is_known)
+                is_valid and self.variables[reference][1].is_integer
+                for reference, is_valid in zip(references, is_known)
             ]
             terms = [f"integer_as_real({term})" if integer else term for term, integer in zip(terms, integers)]
         scope = {"blank": blank, "integer_as_real": integer_as_real}
         values = eval(f"lambda model, run: [{', '.join(terms)}]", scope)  # the fastest way
-        compiled = (
+        entry = (
             list(references),
             values,
             "run" in owners,
@@ -124,11 +125,11 @@ class VariableAccess(FailureHandling):
         )
         if not all(is_known):
             self.report_error(unknown_reference_message(kind, references[is_known.index(False)]))
-            return compiled
+            return entry
         if len(self.readers) == MAX_READERS:
             self.readers.clear()
-        self.last_readers[kind] = self.readers[key] = compiled
-        return compiled
+        self.last_readers[kind] = self.readers[key] = entry
+        return entry
 
     def update_statistics(self, ahead: bool) -> None:
         """Update the statistics of solver and events to the current time; with `ahead` also solver.t_next."""
@@ -146,19 +147,19 @@ class VariableAccess(FailureHandling):
 
     def set_value(self, reference: int, value: float) -> None:
         """Set a value; an invalid one is recorded, and the next step reports it."""
-        name, declared = self.variables[reference]
+        name, declaration = self.variables[reference]
         owner, attribute = self.attribute_owners[reference]
         if value == getattr(owner, attribute) and name not in self.invalid_values and not self.is_moving(name):
             return
-        calculated, fixed = declared.causality not in SETTABLE_CAUSALITIES, declared.variability == "fixed"
-        reason = call_sequence.rejection_reason(self.run, calculated, fixed, declared.accepts(value))
+        is_calculated, is_fixed = declaration.causality not in SETTABLE_CAUSALITIES, declaration.variability == "fixed"
+        reason = call_sequence.rejection_reason(self.run, is_calculated, is_fixed, declaration.accepts(value))
         if reason == OK:
             self.set_invalid(name, "")
             call_sequence.note_change(self.run, self.model)
             setattr(owner, attribute, value)
             self.last_refusal = "", nan  # the next refusal is one of other values
         else:
-            self.set_invalid(name, messages.value_message(reason, exported_name(name, declared), declared, value))
+            self.set_invalid(name, messages.value_message(reason, exported_name(name, declaration), declaration, value))
 
     def is_moving(self, name: str) -> bool:
         """Return whether a variable is an input that varies between settings, so that its attribute may be outdated."""

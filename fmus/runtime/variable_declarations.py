@@ -61,7 +61,7 @@ class VariableDeclaration:
         return "" if self.unit in ("", "1") else f" {self.unit}"
 
     @property
-    def allowed(self) -> str:
+    def allowed_range(self) -> str:
         """Return the range in words."""
         if self.items:
             return "one of " + ", ".join(f"{value} ({label})" for label, value, _ in self.items)
@@ -81,8 +81,8 @@ class Setting(VariableDeclaration):
 
     causality, variability = "parameter", "fixed"
 
-    def __init__(self, start: float, unit: str, text: str, **more: Any) -> None:
-        super().__init__(unit, text, **more)
+    def __init__(self, start: float, unit: str, text: str, **options: Any) -> None:
+        super().__init__(unit, text, **options)
         self.start = start
 
 
@@ -115,8 +115,8 @@ class VariableOwner:
     """Object whose declared variables are plain attributes, initialized with their start values."""
 
     def __init__(self) -> None:
-        for declared in declarations(type(self)):
-            setattr(self, declared.name, declared.start)
+        for declaration in declarations(type(self)):
+            setattr(self, declaration.name, declaration.start)
 
 
 def declarations(cls: type) -> list[VariableDeclaration]:
@@ -129,9 +129,9 @@ def declarations(cls: type) -> list[VariableDeclaration]:
     return list(result.values())
 
 
-def exported_name(path: str, declared: VariableDeclaration) -> str:
+def exported_name(path: str, declaration: VariableDeclaration) -> str:
     """Return the name in the FMU of the variable at a dotted path."""
-    return declared.element or path
+    return declaration.element or path
 
 
 def fmi_variables(model: Any, run: object) -> list[tuple[str, VariableDeclaration]]:
@@ -140,15 +140,15 @@ def fmi_variables(model: Any, run: object) -> list[tuple[str, VariableDeclaratio
     An enumeration with one item, as the build leaves it, is no choice: it is left out and keeps its start value.  An
     FMU with Reals only has no other enumerations, and offers integers as Reals.
     """
-    declared = [(name, meaning) for name, meaning in variables(model) + variables(run) if len(meaning.items) != 1]
+    pairs = [(name, meaning) for name, meaning in variables(model) + variables(run) if len(meaning.items) != 1]
     if model.real_only:
-        declared = [(name, as_real(meaning)) for name, meaning in declared if not meaning.items]
-    return declared
+        pairs = [(name, as_real(meaning)) for name, meaning in pairs if not meaning.items]
+    return pairs
 
 
-def as_real(declared: VariableDeclaration) -> VariableDeclaration:
+def as_real(declaration: VariableDeclaration) -> VariableDeclaration:
     """Return a declaration with an integer as a dimensionless Real."""
-    real = copy(declared)
+    real = copy(declaration)
     if real.type == "Integer":
         real.type, real.unit = "Real", "1"
     return real
@@ -156,7 +156,7 @@ def as_real(declared: VariableDeclaration) -> VariableDeclaration:
 
 def variables(owner: object, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:
     """Return dotted path and declaration of every variable of an object and of the objects it owns, in order."""
-    result = [(prefix + declared.name, declared) for declared in declarations(type(owner))]
+    result = [(prefix + declaration.name, declaration) for declaration in declarations(type(owner))]
     for name, part in vars(owner).items():
         if isinstance(part, VariableOwner):
             result += variables(part, f"{prefix}{name}.")

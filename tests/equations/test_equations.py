@@ -349,7 +349,7 @@ class Jump(Model):
 
 def test_the_test_models_have_choices_and_contacts():
     """The models used here cover them."""
-    kinds = {type(e) for source in SOURCES for e in find_model(source).analysis.declared}
+    kinds = {type(e) for source in SOURCES for e in find_model(source).analysis.variables}
     assert {Choice, Contact} <= kinds
     functions = {name for source in SOURCES for name in FUNCTIONS if f"{name}(" in find_model(source).generated_source}
     assert functions == {*FUNCTIONS}

@@ -83,7 +83,7 @@ def used_names(body, folder):
         node.id.rstrip("123456789") for node in ast.walk(ast.parse(source.generated_source)) if hasattr(node, "id")
     }
     attributes = public_attributes(scalar_class(source)) | public_attributes(lowered_model(source))
-    variable_names = {e.name for e in source.analysis.declared}
+    variable_names = {e.name for e in source.analysis.variables}
     return sorted(attributes - variable_names), sorted(names - attributes - variable_names - {*fmus.__all__})
 
 

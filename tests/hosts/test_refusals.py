@@ -124,7 +124,7 @@ def invalid_starts():
     for name in MODELS:
         for variable, declaration in declarations_of(name).items():
             if variable in parameters(name):
-                words = [variable, declaration.allowed]
+                words = [variable, declaration.allowed_range]
             elif declaration.items:
                 words = [variable, *(item[0] for item in declaration.items)]
             else:

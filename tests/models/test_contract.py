@@ -134,9 +134,9 @@ def test_a_declaration_states_its_allowed_range():
     assert vars(Sample()) == {"free": 1.0, "mass": 1.0, "share": 0.5, "kind": 2}
     message = value_message(OUT_OF_RANGE, "mass", Sample.mass, -2.0)
     assert message == "mass = -2.0 kg is refused: mass must be above 0.0 kg"
-    assert Sample.share.allowed == "at least 0.0 and below 1.0"
-    assert Sample.kind.allowed == "one of 1 (one), 2 (two)"
-    assert Sample.free.allowed == "a finite number"
+    assert Sample.share.allowed_range == "at least 0.0 and below 1.0"
+    assert Sample.kind.allowed_range == "one of 1 (one), 2 (two)"
+    assert Sample.free.allowed_range == "a finite number"
     inf = float("inf")
     verdicts = {Sample.free: (inf, -inf, inf - inf), Sample.mass: (0.0, -1e-300), Sample.share: (-1e-300, 1.0)}
     assert not any(d.accepts(value) for d, values in verdicts.items() for value in values)

@@ -4,7 +4,7 @@ import re
 
 from commands import build
 
-from fmus.page.html_page import HERE, MODULES
+from fmus.page.html_page import MODULES, PAGE_FOLDER
 
 
 def test_five_models_take_less_than_600_kb_and_load_nothing(page):
@@ -35,9 +35,9 @@ def test_a_model_unsuitable_for_the_page_is_reported_in_one_sentence(tmp_path):
 
 def test_every_module_imports_existing_names_from_earlier_modules_only():
     exports = {}
-    assert {path.stem for path in (HERE / "script").glob("*.js")} == set(MODULES)
+    assert {path.stem for path in (PAGE_FOLDER / "script").glob("*.js")} == set(MODULES)
     for name in MODULES:
-        text = (HERE / "script" / f"{name}.js").read_text(encoding="utf-8")
+        text = (PAGE_FOLDER / "script" / f"{name}.js").read_text(encoding="utf-8")
         for names, source in re.findall(r'^import \{ ([^}]+) \} from "\./(\w+)\.js";$', text, re.M):
             assert set(names.split(", ")) <= exports[source], (name, source)
             body = re.sub(r"^import .*$", "", text, flags=re.M)

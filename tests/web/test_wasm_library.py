@@ -9,7 +9,7 @@ import pytest
 
 from fmus.compiler.c.c_expressions import ARGUMENT_COUNTS, MAY_RAISE, NEVER_RAISING
 from fmus.packaging.native.binaries import INTRINSICS
-from fmus.page.html_page import HERE
+from fmus.page.html_page import PAGE_FOLDER
 
 FUNCTIONS = [function for function in (*NEVER_RAISING, *MAY_RAISE) if function not in INTRINSICS]
 AT = (0.0, -0.0, 1e-300, 1e-9, 0.3, -0.7, 1.0, -1.0, 2.5, -20.0, 700.0, 1e22, math.inf, -math.inf, math.nan)
@@ -19,7 +19,7 @@ NUMBERS = [0.1, 5e-324, 1.7976931348623157e308, 9007199254740993.0, 1e16, 123456
 @pytest.fixture(scope="module")
 def library(browser):
     """Return an evaluator of library functions, with a memory of their own and helpers to write and read strings."""
-    text = (HERE / "script" / "libc.js").read_text(encoding="utf-8").replace("export ", "")
+    text = (PAGE_FOLDER / "script" / "libc.js").read_text(encoding="utf-8").replace("export ", "")
     setting = """
         const memory = new WebAssembly.Memory({ initial: 1 }), output = [];
         const c = libc(() => memory, (bytes) => output.push(...bytes));

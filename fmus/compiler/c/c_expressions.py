@@ -313,11 +313,13 @@ class ExpressionTranslator(ast.NodeVisitor):
 
     def visit_IfExp(self, node: ast.IfExp) -> CExpression:
         test = self.boolean(node.test)
-        yes, no = self.visit_conditional(self.run_time_number, (node.body, node.orelse))
-        if yes.ctype != no.ctype:
+        true_value, false_value = self.visit_conditional(self.run_time_number, (node.body, node.orelse))
+        if true_value.ctype != false_value.ctype:
             raise self.error(node)
         return CExpression(
-            yes.ctype, f"{test.as_operand(OR)} ? {yes.as_operand(OR)} : {no.as_operand(CONDITIONAL)}", CONDITIONAL
+            true_value.ctype,
+            f"{test.as_operand(OR)} ? {true_value.as_operand(OR)} : {false_value.as_operand(CONDITIONAL)}",
+            CONDITIONAL,
         )
 
     # ---- calls
@@ -326,16 +328,16 @@ class ExpressionTranslator(ast.NodeVisitor):
         effects_allowed = self.effects_allowed
         if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.error(node)
-        called = self.super_method(node) or self.visit(node.func).ctype
+        callee = self.super_method(node) or self.visit(node.func).ctype
         values = [self.visit(argument) for argument in node.args]
-        if isinstance(called, BoundMethod):
+        if isinstance(callee, BoundMethod):
             return self.translate_call(
-                node, called.function, [CExpression(StructPointer(called.cls), called.owner), *values], effects_allowed
+                node, callee.function, [CExpression(StructPointer(callee.cls), callee.owner), *values], effects_allowed
             )
-        if isinstance(called, CompileTimeValue) and isinstance(called.value, FunctionType):
-            return self.translate_call(node, called.value, values, effects_allowed)
-        if isinstance(called, CompileTimeValue) and isinstance(called.value, (BuiltinFunctionType, type)):
-            return self.translate_builtin(node, called.value, values)
+        if isinstance(callee, CompileTimeValue) and isinstance(callee.value, FunctionType):
+            return self.translate_call(node, callee.value, values, effects_allowed)
+        if isinstance(callee, CompileTimeValue) and isinstance(callee.value, (BuiltinFunctionType, type)):
+            return self.translate_builtin(node, callee.value, values)
         raise self.error(node)
 
     def super_method(self, node: ast.Call) -> BoundMethod | None:
@@ -366,32 +368,32 @@ class ExpressionTranslator(ast.NodeVisitor):
         ]
         if not all(isinstance(value.ctype, (Scalar, StructPointer, CompileTimeValue)) for value in arguments):
             raise self.error(node)
-        compiled = self.specialise(function, [value.ctype for value in arguments])
-        if compiled is None:
+        c_function = self.specialise(function, [value.ctype for value in arguments])
+        if c_function is None:
             raise self.error(node)
-        if self.may_fault and not compiled.is_pure:  # after a fault in the arguments, the call must not have effects
+        if self.may_fault and not c_function.is_pure:  # after a fault in the arguments, the call must not have effects
             arguments = [self.in_local(value) if isinstance(value.ctype, Scalar) else value for value in arguments]
             self.emit_fault_check()
         texts = [value.text for value in arguments if not isinstance(value.ctype, CompileTimeValue)]
-        if compiled.can_fault:
+        if c_function.can_fault:
             texts.append(self.fault_argument())
-        text = f"{compiled.name}({', '.join(texts)})"
+        text = f"{c_function.name}({', '.join(texts)})"
         self.effects_allowed = False
-        if not compiled.is_pure:
+        if not c_function.is_pure:
             self.is_pure = False
             if self.statement_call is not node:
                 if self.conditional_depth or not effects_allowed:
                     raise self.error(node)
-                if compiled.result:
-                    text = self.emit_temporary(compiled.result, text)
+                if c_function.result:
+                    text = self.emit_temporary(c_function.result, text)
                     self.emit_fault_check()
                     self.effects_allowed = True
-        return CExpression(compiled.result or CompileTimeValue(None), text)
+        return CExpression(c_function.result or CompileTimeValue(None), text)
 
     def translate_builtin(self, node: ast.Call, function: Callable[..., Any], values: list[CExpression]) -> CExpression:
         """Translate a call of a function of math, of float or of int."""
-        allowed = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, float, int)
-        if function not in allowed or len(values) != ARGUMENT_COUNTS.get(function, 1):
+        supported_functions = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, float, int)
+        if function not in supported_functions or len(values) != ARGUMENT_COUNTS.get(function, 1):
             raise self.error(node)
         values = [self.arithmetic_operand(argument, value) for argument, value in zip(node.args, values, strict=True)]
         texts = ", ".join(value.text for value in values)

@@ -57,25 +57,25 @@ class FunctionTranslator(ExpressionTranslator):
             if not isinstance(self.local_types[p], CompileTimeValue)
         ]
         parameters += ["bool *fault"] * self.can_fault
-        about = " - ".join([source_location(self.function), *self.summary])
+        comment = " - ".join([source_location(self.function), *self.summary])
         head = c_declaration(self.result, name) if self.result else f"void {name}"
         leave = f"return {self.zero_result()};" if self.result else "return;"
         body = [line.format(leave=leave) if line.lstrip() == FAULT_CHECK else line for line in self.lines]
         parameter_list = ", ".join(parameters) or "void"
         body = remove_unused_assignments(body, {*self.local_types} - {*self.parameters})
         names = names_in_lines(body)
-        unused = [
+        casts = [
             f"(void){name}"
             for name in (parameter.split()[-1].lstrip("*") for parameter in parameters)
             if name not in names
         ]
-        about_unused = [f"    {', '.join(unused)};"] if unused else []
+        cast_lines = [f"    {', '.join(casts)};"] if casts else []
         lines = [
-            f"/* {about} */",
+            f"/* {comment} */",
             f"static {'COLD ' * is_rarely_called}{head}({parameter_list})",
             "{",
             *self.declarations(names),
-            *about_unused,
+            *cast_lines,
             *body,
             "}",
         ]
@@ -172,15 +172,15 @@ class FunctionTranslator(ExpressionTranslator):
 
     def assign_parallel(self, targets: list[ast.expr], values: list[ast.expr]) -> None:
         """Translate a, b = x, y. Values are stored first if an assignment could change a later one."""
-        translated = [self.run_time_number(value) for value in values]
+        expressions = [self.run_time_number(value) for value in values]
         names_read = [names_in(value) for value in values]
         independent = all(not names_in(target) & set().union(*names_read[i + 1 :]) for i, target in enumerate(targets))
         has_calls = any(isinstance(part, ast.Call) for value in values for part in ast.walk(value))
         has_attributes = not all(isinstance(target, ast.Name) for target in targets)  # a call could read them
         if self.may_fault or not independent or (has_calls and has_attributes):
-            translated = [self.in_local(value) for value in translated]
+            expressions = [self.in_local(value) for value in expressions]
             self.emit_fault_check()
-        for target, value in zip(targets, translated, strict=True):
+        for target, value in zip(targets, expressions, strict=True):
             self.assign(target, value)
 
     def unpack(self, target: ast.Tuple, value: CExpression) -> None:
@@ -190,8 +190,8 @@ class FunctionTranslator(ExpressionTranslator):
             self.assign(part, CExpression(ctype, f"{value.text}._{i}"))
 
     def visit_AugAssign(self, node: ast.AugAssign) -> bool:
-        loaded = replace_fields(node.target, ctx=ast.Load())
-        value = ast.copy_location(ast.BinOp(loaded, node.op, node.value), node)
+        operand = replace_fields(node.target, ctx=ast.Load())
+        value = ast.copy_location(ast.BinOp(operand, node.op, node.value), node)
         self.assign(node.target, self.run_time_number(value))
         return True
 

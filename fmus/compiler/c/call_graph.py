@@ -30,8 +30,8 @@ class CallGraph:
         """Add an entry point. Entry points always have a fault flag."""
         body = FunctionTranslator(self.layout, self.specialise, function, arg_types)
         body.can_fault = True
-        compiled = self._functions[(function, *arg_types)] = self._add(body, name or self._unique_name(function))
-        return compiled
+        c_function = self._functions[(function, *arg_types)] = self._add(body, name or self._unique_name(function))
+        return c_function
 
     def specialise(self, function: FunctionType, arg_types: list[CType]) -> CFunction | None:
         """Translate a function for given argument types; None means that it is recursive."""

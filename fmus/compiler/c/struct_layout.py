@@ -34,13 +34,13 @@ class StructLayout:
     def __init__(self, model: object, *others: object) -> None:
         self.fields: dict[type, dict[str, CType]] = {}
         self.constant_arrays: dict[str, tuple[float, ...]] = {}  # of the module of the model, which functions read
-        self._seen: set[int] = set()
+        self._instance_ids: set[int] = set()
         self.model, *_ = [self._add(instance, type(instance).__name__) for instance in (model, *others)]
 
     def _add(self, instance: object, path: str) -> StructPointer:
-        if id(instance) in self._seen:
+        if id(instance) in self._instance_ids:
             raise AttributeTypeError(path)
-        self._seen.add(id(instance))
+        self._instance_ids.add(id(instance))
         fields = {name: self._type_of(value, f"{path}.{name}") for name, value in vars(instance).items()}
         cls = type(instance)
         names = [other.__name__ for other in self.fields if other is not cls]

@@ -39,14 +39,14 @@ def operands_first(*roots: Operand, operands_of: Callable[[Operand], Iterable[Op
         Returns the operands of a subexpression that are visited.
     """
     result: list[Operand] = []
-    visited: set[int] = set()
+    visited_ids: set[int] = set()
     stack = [(e, False) for e in reversed(roots)]
     while stack:
         e, is_complete = stack.pop()
         if is_complete:
             result.append(e)
-        elif id(e) not in visited:
-            visited.add(id(e))
+        elif id(e) not in visited_ids:
+            visited_ids.add(id(e))
             stack.append((e, True))
             stack.extend((operand, False) for operand in reversed((*operands_of(e),)))
     return result
@@ -117,12 +117,12 @@ def value_operands(e: Operand) -> tuple[Operand, ...]:
 def unconditional_quotients(targets: Collection[Operand]) -> list[Term]:
     """Return the quotients that every evaluation of the targets calculates: those outside the cases of choose()."""
     result: list[Term] = []
-    visited: Memo = {}
+    visited_operands: Memo = {}
     stack = list(targets)
     while stack:
         e = stack.pop()
-        if id(e) not in visited:
-            visited[id(e)] = e
+        if id(e) not in visited_operands:
+            visited_operands[id(e)] = e
             stack += unconditional_operands(e)
             if isinstance(e, Term) and e.op == "/":
                 result.append(e)
@@ -131,12 +131,12 @@ def unconditional_quotients(targets: Collection[Operand]) -> list[Term]:
 
 def is_same_expression(a: Operand, b: Operand) -> bool:
     """Return whether two expressions have the same structure."""
-    stack, compared = [(a, b)], set()
+    stack, compared_pairs = [(a, b)], set()
     while stack:
         a, b = stack.pop()
-        if a is b or (id(a), id(b)) in compared:
+        if a is b or (id(a), id(b)) in compared_pairs:
             continue
-        compared.add((id(a), id(b)))
+        compared_pairs.add((id(a), id(b)))
         if isinstance(a, Term) and isinstance(b, Term):
             if a.structure_hash != b.structure_hash or a.op != b.op or len(a.args) != len(b.args):
                 return False
@@ -179,10 +179,10 @@ def build_term(op: str, *args: Operand) -> Operand:
     if op == "neg":
         return negate(args[0])
     if op == "choose":
-        condition, this, that = args
+        condition, true_case, false_case = args
         if isinstance(condition, bool):  # decided at build time
-            return this if condition else that
-        return this if is_same_expression(this, that) else Term(op, *args)
+            return true_case if condition else false_case
+        return true_case if is_same_expression(true_case, false_case) else Term(op, *args)
     if isinstance(op, (Piece, Coefficient)) and not any(isinstance(e, Expression) for e in args):
         return op.evaluate(*args)
     if op in FUNCTIONS and not isinstance(args[0], Expression):
@@ -285,15 +285,15 @@ def differentiate(
         Rules: returns the derivative of a term, given a function that returns those of its operands.
     """
     names = {} if names is None else names
-    existing, moving, result = subexpressions(e), dependents([e], by), Memo()
+    existing_terms, dependent_ids, result = subexpressions(e), dependents([e], by), Memo()
 
     def moving_operands(part: Operand) -> tuple[Operand, ...]:
-        if id(part) not in moving or part in by or getattr(part, "op", "") == "copysign":
+        if id(part) not in dependent_ids or part in by or getattr(part, "op", "") == "copysign":
             return ()
         return value_operands(part)
 
     for part in operands_first(e, operands_of=moving_operands):
-        if id(part) not in moving or part in by:
+        if id(part) not in dependent_ids or part in by:
             new = by.get(part, 0.0)
         elif isinstance(part, Output):
             new = result[id(part.expression)]
@@ -302,7 +302,7 @@ def differentiate(
             new = of_term(part, lambda operand: result[id(operand)])
         result[id(part)] = new
         name = (part.name or names.get(part, "")) if isinstance(part, (Term, Output)) and part not in by else ""
-        if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in existing:
+        if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in existing_terms:
             names[new] = f"d{name}_d{next(iter(by)).name}"
     return result[id(e)]
 

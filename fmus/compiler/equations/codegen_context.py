@@ -32,7 +32,7 @@ class CodegenContext:
         self.analysis = analysis
         self.rate_outputs = [analysis.rate_outputs[s] for s in analysis.dynamic_states]  # rates of states
         self.driver = analysis.drivers[0] if analysis.drivers else None
-        declared_names = {e.name for e in analysis.declared}
+        declared_names = {e.name for e in analysis.variables}
         self.names = analysis.names  # of terms that the model does not name
         for c in analysis.contacts:
             for name, e in ("load", analysis.load.get(c)), ("slide", c.slide), ("limit", analysis.holding_limit[c]):
@@ -69,18 +69,18 @@ class CodegenContext:
             roots += [c.slide, analysis.holding_limit[c], c.eps]
             roots += [] if analysis.rests_when_stuck else [analysis.A[c, d] for d in analysis.contacts]
         roots += analysis.outputs
-        moving = dependents(roots, (*analysis.time_varying, *analysis.input_symbols))
+        dependent_ids = dependents(roots, (*analysis.time_varying, *analysis.input_symbols))
         can_fail = self._expressions_that_can_fail(roots)
         case_roots: list[Operand] = []
 
         def find_constants(targets: Sequence[Operand], in_case: bool) -> None:
-            stack, visited = [*reversed(targets)], set()
+            stack, visited_ids = [*reversed(targets)], set()
             while stack:
                 e = stack.pop()
-                if id(e) in visited:
+                if id(e) in visited_ids:
                     continue
-                visited.add(id(e))
-                is_constant = isinstance(e, Term) and self.name_of(e) and id(e) not in moving
+                visited_ids.add(id(e))
+                is_constant = isinstance(e, Term) and self.name_of(e) and id(e) not in dependent_ids
                 if is_constant and not (in_case and id(e) in can_fail):
                     result[id(e)] = e
                 elif in_case:

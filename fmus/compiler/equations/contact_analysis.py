@@ -59,16 +59,18 @@ class ContactAnalysis(ModelRoles):
                 self.A[c, d] = negate(effect)
             if is_same_expression(self.A[c, c], 0.0):
                 raise ModelError(f"{c.name} does not act on its own slip, so it can never stick", c.location)
-            moved = [s for s in self.dynamic_states if depends_on(self.rate_outputs[s], (c,))]
-            if any(depends_on(self.derivative(c.slip, {s: 1.0}), moved) for s in moved):
+            moved_states = [s for s in self.dynamic_states if depends_on(self.rate_outputs[s], (c,))]
+            if any(depends_on(self.derivative(c.slip, {s: 1.0}), moved_states) for s in moved_states):
                 raise ModelError(f"slip of {c.name} must be linear in the speeds on which it acts", c.location)
         self.independent_contacts = [
             c for c in self.contacts if all(is_same_expression(self.A[c, d], 0.0) for d in self.contacts if d is not c)
         ]
         self.interacting_contacts = [c for c in self.contacts if not is_among(c, self.independent_contacts)]
-        moving = (*self.time_varying, *self.input_symbols)
+        varying_symbols = (*self.time_varying, *self.input_symbols)
         self.variable_lever_contacts = [
-            c for c in lines if any(depends_on(self.derivative(c.slip, {s: 1.0}), moving) for s in self.dynamic_states)
+            c
+            for c in lines
+            if any(depends_on(self.derivative(c.slip, {s: 1.0}), varying_symbols) for s in self.dynamic_states)
         ]
         self.holding_limit: dict[Contact, Operand] = {}
         for c in self.contacts:
@@ -135,7 +137,7 @@ class ContactAnalysis(ModelRoles):
             else build_term("/", substitute(rate, {force: 0.0}), inverse_mass)
             for rate, force in zip(rates, c.components, strict=True)
         ]
-        (x, y), (load_x, load_y), total, held = c.slips, loads, 0.0, 0.0
+        (x, y), (load_x, load_y), total, load = c.slips, loads, 0.0, 0.0
         is_stuck = Term("==", c.mode, 0)
         for force, *pair in (c.x, x, y, load_x, load_y), (c.y, y, x, load_y, load_x):
             direction = Term("slip_direction", *pair, c.slide, c.mode)
@@ -143,8 +145,8 @@ class ContactAnalysis(ModelRoles):
             total = build_term("+", total, build_term("*", pair[2], direction))
             # at rest, on a belt, the slip has rounding errors
             of_load = Term("slip_direction", 0.0, 0.0, *pair[2:], c.slide, c.mode)
-            held = build_term("+", held, build_term("*", pair[2], of_load))
-        self.load[c], self.A[c, c] = held, inverse_mass
+            load = build_term("+", load, build_term("*", pair[2], of_load))
+        self.load[c], self.A[c, c] = load, inverse_mass
         self.slip_rate[c] = build_term("*", inverse_mass, build_term("-", total, c))
         self.planar_rates[c] = [substitute(rate, dict.fromkeys(c.components, 0.0)) for rate in rates]
 
@@ -201,15 +203,16 @@ class ContactAnalysis(ModelRoles):
         if self.dynamic_states[0] is not c.slip:
             return False
         changes = (self.derivative(self.load[c], self.explicit_time_derivatives), self.holding_limit[c])
-        prescribed = self.prescribed_inputs
-        slopes = [self.derivative(self.load[c], {e: 1.0}) for e in prescribed]
+        prescribed_inputs = self.prescribed_inputs
+        slopes = [self.derivative(self.load[c], {e: 1.0}) for e in prescribed_inputs]
         return (
             not any(depends_on(e, by_time) for e in changes)
             and self.is_ramp(self.load[c])
-            and not depends_on(self.holding_limit[c], prescribed)
+            and not depends_on(self.holding_limit[c], prescribed_inputs)
             and not any(depends_on(slope, (*by_time, *self.inputs)) for slope in slopes)
             and not any(
-                has_condition_on(e, (*by_time, *prescribed)) for e in (self.load[c], *self._dynamic_expressions())
+                has_condition_on(e, (*by_time, *prescribed_inputs))
+                for e in (self.load[c], *self._dynamic_expressions())
             )
         )
 
@@ -221,22 +224,22 @@ class ContactAnalysis(ModelRoles):
         and for slips that are the product of a lever and a speed.
         """
         result: list[tuple[Contact, State, Operand]] = []
-        remaining = [
+        remaining_slips = [
             (c, slip) for c in self.contacts for slip in (c.slips if isinstance(c, PlanarContact) else (c.slip,))
         ]
         while True:
-            alone = [
+            candidates = [
                 (c, slip, s)
-                for c, slip in remaining
+                for c, slip in remaining_slips
                 for s in self.dynamic_states
                 if (is_summand(slip, s) or (is_factor(slip, s) and depends_on(self.rate_outputs[s], (c,))))
-                and not any(depends_on(other, (s,)) for _, other in remaining if other is not slip)
+                and not any(depends_on(other, (s,)) for _, other in remaining_slips if other is not slip)
             ]
-            if not alone:
+            if not candidates:
                 return result
-            c, slip, s = alone[0]
+            c, slip, s = candidates[0]
             result.insert(0, (c, s, solve_for(slip, s) if is_summand(slip, s) else 0.0))
-            remaining = [(d, other) for d, other in remaining if other is not slip]
+            remaining_slips = [(d, other) for d, other in remaining_slips if other is not slip]
 
     def _dynamic_expressions(self) -> list[Operand]:
         """Return the expressions that determine the motion."""
@@ -251,17 +254,19 @@ class ContactAnalysis(ModelRoles):
         """
         result = []
         for c in self.contacts:
-            for e, op, meaning, allowed in (
+            for e, op, meaning, requirement in (
                 (c.slide, "<", "the sliding force is negative", "it is at least 0"),
                 (c.hold, "<", "the holding force is negative", "it is at least 0"),
                 (self.A[c, c], "<=", "the force accelerates its own slip", "it opposes the slip"),
             ):
                 is_constant = isinstance(e, Expression) and not depends_on(e, (*self.time_varying, *self.input_symbols))
                 if is_constant and not is_nonnegative(e):
-                    values = ", ".join(f"{one.label} = {{{one.name}!r}}" for one in variables_in(e))
-                    broken = Term(op, e, 0.0)
-                    broken.location = c.location
-                    result.append(Rule(broken, f"{c.name}: {meaning} with {values}: set values with which {allowed}"))
+                    values = ", ".join(f"{variable.label} = {{{variable.name}!r}}" for variable in variables_in(e))
+                    comparison = Term(op, e, 0.0)
+                    comparison.location = c.location
+                    result.append(
+                        Rule(comparison, f"{c.name}: {meaning} with {values}: set values with which {requirement}")
+                    )
         return tuple(result)
 
     def _holding_rules(self) -> tuple[Rule, ...]:
@@ -271,35 +276,37 @@ class ContactAnalysis(ModelRoles):
         """
         result = []
         for c in (c for c in self.contacts if c.hold is not None):
-            sliding, holding = (set(variables_in(e)) & {*self.parameters} for e in (c.slide, c.hold))
+            slide_parameters, hold_parameters = (set(variables_in(e)) & {*self.parameters} for e in (c.slide, c.hold))
             has_rule = any(
-                sliding & set(variables_in(rule.broken)) and holding & set(variables_in(rule.broken))
+                slide_parameters & set(variables_in(rule.broken)) and hold_parameters & set(variables_in(rule.broken))
                 for rule in self.rules
             )
             if not has_rule and not depends_on(c.slide - c.hold, (*self.time_varying, *self.input_symbols)):
-                values = ", ".join(f"{e.label} = {{{e.name}!r}}" for e in self.parameters if e in sliding | holding)
+                values = ", ".join(
+                    f"{e.label} = {{{e.name}!r}}" for e in self.parameters if e in slide_parameters | hold_parameters
+                )
                 sentence = (
                     f"{c.name}: the sliding force exceeds the holding force ({values}): lower slide or raise hold"
                 )
-                broken = Term(">", c.slide, build_term("*", 1.0 + HOLD_TOLERANCE, c.hold))
-                broken.location = c.location
-                result.append(Rule(broken, sentence))
+                comparison = Term(">", c.slide, build_term("*", 1.0 + HOLD_TOLERANCE, c.hold))
+                comparison.location = c.location
+                result.append(Rule(comparison, sentence))
         return tuple(result)
 
     def _find_limits(self) -> list[Condition]:
         """Return the limits of friction forces that vary: not negative, and no sliding above the holding force."""
-        varying = (*self.time_varying, *self.input_symbols)
+        varying_symbols = (*self.time_varying, *self.input_symbols)
         result = []
         for c in self.contacts:
             at = "at t = {violation_time!r} s"
-            if c.lifts_off is None and depends_on(c.slide, varying) and not is_nonnegative(c.slide):
+            if c.lifts_off is None and depends_on(c.slide, varying_symbols) and not is_nonnegative(c.slide):
                 sentence = (
                     f"{c.name}: the sliding force becomes negative {at} ({{violation_value!r}} {c.unit}); if the "
                     "contact lifts off there, declare lifts_off=True"
                 )
                 result.append(Condition(c.slide, (c.slide,), sentence=sentence))
             at_rest = substitute(c.slide, values_at_rest(c))
-            if c.hold is None or depends_on(c.slide, (c.mode,)) or not depends_on(c.hold - at_rest, varying):
+            if c.hold is None or depends_on(c.slide, (c.mode,)) or not depends_on(c.hold - at_rest, varying_symbols):
                 continue
             surplus = build_term("-", build_term("*", 1.0 + HOLD_TOLERANCE, c.hold), at_rest)
             sentence = (
@@ -308,8 +315,8 @@ class ContactAnalysis(ModelRoles):
             )
             margin = Term("choose", Term("==", c.mode, 0), surplus, 1.0)
             result.append(Condition(margin, (c.slide,), sentence=sentence))
-        declared = [e for variable in self.declared for e in self.declared_expressions(variable)]
-        return [*result, *table_limits(declared, self.contacts)]
+        expressions = [e for variable in self.variables for e in self.declared_expressions(variable)]
+        return [*result, *table_limits(expressions, self.contacts)]
 
     def check_solvable(self) -> None:
         """Raise ModelError if the solver cannot run the model."""
@@ -355,11 +362,11 @@ class ContactAnalysis(ModelRoles):
             if not A[c, c] > 1e-12 * diagonal[c]:
                 others = [d for d in contacts[:n] if not is_same_expression(self.A[c, d], 0.0)]
                 equal = [d for d in others if is_same_expression(c.slip, d.slip) and not (c.lifts_off or d.lifts_off)]
-                one = "write one contact with the sum of their limits, or " if equal else ""
+                remedy = "write one contact with the sum of their limits, or " if equal else ""
                 names = " and ".join(d.name for d in equal or others)
                 raise ModelError(
-                    f"{c.name} and {names} hold the same motion at rest, so their forces are not determined: {one}put "
-                    "a spring between them",
+                    f"{c.name} and {names} hold the same motion at rest, so their forces are not determined: {remedy}"
+                    "put a spring between them",
                     c.location,
                 )
             for d in contacts[n + 1 :]:

@@ -69,12 +69,12 @@ def derivative_unknown(
     context: CodegenContext, name: str, by: dict[Expression, Operand], contacts: Sequence[Contact]
 ) -> ContactUnknown:
     """Return the derivatives of the forces of some contacts along `by` as unknowns."""
-    analysis, fixed = context.analysis, by | dict.fromkeys(context.analysis.contacts, 0.0)
+    analysis, derivatives = context.analysis, by | dict.fromkeys(context.analysis.contacts, 0.0)
     sliding_values = {c: analysis.sliding_force_derivative(c, by) for c in contacts}
     stuck_values = {
         c: analysis.derivative(analysis.load[c], by)
         if c in analysis.load
-        else analysis.derivative(analysis.slip_rate[c], fixed)
+        else analysis.derivative(analysis.slip_rate[c], derivatives)
         for c in contacts
     }
     terms = {
@@ -106,8 +106,10 @@ def emit_solution(
     context: CodegenContext, printer: ExpressionPrinter, unknowns: Sequence[ContactUnknown], by_law: bool = False
 ) -> None:
     """Emit the lines that solve for the unknowns; with `by_law`, the selected law decides which contacts are stuck."""
-    analysis, interacting = context.analysis, context.analysis.interacting_contacts
-    matrix = {(c, d): printer.fresh_name(f"row_{c.name}_{d.name}") for c in interacting for d in interacting}
+    analysis, interacting_contacts = context.analysis, context.analysis.interacting_contacts
+    matrix = {
+        (c, d): printer.fresh_name(f"row_{c.name}_{d.name}") for c in interacting_contacts for d in interacting_contacts
+    }
     names = {
         (n, c): c.name if e is c else printer.fresh_name(e.name)
         for n, unknown in enumerate(unknowns)
@@ -119,7 +121,7 @@ def emit_solution(
             printer.local_variable(unknowns[n].stuck_values[c])
     for c in analysis.contacts:
         indices = [n for n in range(len(unknowns)) if (n, c) in names]
-        row = interacting if is_among(c, interacting) else []
+        row = interacting_contacts if is_among(c, interacting_contacts) else []
         test = f"{c.mode.name} == 0" + (" and self.friction == HYBRID" if by_law and SIGN in c.laws else "")
         if indices:
             with printer.block(f"if {test}:"):
@@ -133,11 +135,13 @@ def emit_solution(
                 for d in row:
                     printer.emit(f"{matrix[c, d]} = {printer.text(float(c is d))}")
     right_sides = [
-        {c: names[n, c] for c in interacting} for n in range(len(unknowns)) if all((n, c) in names for c in interacting)
+        {c: names[n, c] for c in interacting_contacts}
+        for n in range(len(unknowns))
+        if all((n, c) in names for c in interacting_contacts)
     ]
     if right_sides:  # else all derivatives of the forces are zero
-        has_variable_levers = any(is_among(c, analysis.variable_lever_contacts) for c in interacting)
-        emit_elimination(printer, interacting, matrix, right_sides, has_variable_levers)
+        has_variable_levers = any(is_among(c, analysis.variable_lever_contacts) for c in interacting_contacts)
+        emit_elimination(printer, interacting_contacts, matrix, right_sides, has_variable_levers)
     for (n, c), name in names.items():
         printer.bound_names[unknowns[n].symbols[c]] = name
 
@@ -184,15 +188,15 @@ def slips_of_laws(analysis: ModelAnalysis) -> list[Operand]:
     return [c.slip for c in analysis.contacts if len(c.laws) > 1]
 
 
-def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter, needed: Sequence[Contact]) -> None:
+def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter, contacts: Sequence[Contact]) -> None:
     """Emit the modes, and the forces of some contacts, under the selected law."""
-    contacts = [c for c in context.analysis.contacts if len(c.laws) > 1]
-    if contacts:
+    law_contacts = [c for c in context.analysis.contacts if len(c.laws) > 1]
+    if law_contacts:
         with printer.block("if self.friction != HYBRID:"):
-            for c in contacts:
+            for c in law_contacts:
                 printer.emit(f"{c.mode.name} = {law_mode(printer, c)}")
-    emit_solution(context, printer, [force_unknown(context, needed)], by_law=True)
-    for c in contacts:
+    emit_solution(context, printer, [force_unknown(context, contacts)], by_law=True)
+    for c in law_contacts:
         if THRESHOLD in c.laws:
             with printer.block(f"if {c.mode.name} == 0 and self.friction != HYBRID:"):
                 limit = printer.text(context.analysis.holding_limit[c])

@@ -25,12 +25,12 @@ METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
 
 def check_declarations(analysis: ModelRoles) -> None:
     """Check that all variables are declared in this class, and that modes, starts and rules are valid."""
-    known, location = set(analysis.declared), analysis.model.location
+    variables, location = set(analysis.variables), analysis.model.location
 
     def operands_in_declaration(e: Operand) -> tuple[Operand, ...]:
-        return () if isinstance(e, Output) and e in known else operands(e)
+        return () if isinstance(e, Output) and e in variables else operands(e)
 
-    for e in analysis.declared:
+    for e in analysis.variables:
         for part in analysis.declared_expressions(e):
             parts = operands_first(part, operands_of=operands_in_declaration)
             for leaf in parts:
@@ -41,7 +41,7 @@ def check_declarations(analysis: ModelRoles) -> None:
                         f"{e.name} uses a variable without a name: assign the variable to a name in the class first",
                         e.location,
                     )
-                if leaf not in known:
+                if leaf not in variables:
                     raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {analysis.name}", e.location)
             _check_choices(e, parts)
         _check_variable(analysis, e)
@@ -118,17 +118,17 @@ def _check_variable(analysis: ModelRoles, e: Variable) -> None:
     numbers = {name: vars(e)[name] for name, option in OPTIONS.items() if option.type is float and name in vars(e)}
     for word, value in {"start": e.start, **numbers}.items():
         if not is_number(value) or (isinstance(value, int) and abs(value) > LARGEST_FLOAT):
-            got = "an expression" if isinstance(value, Expression) else describe(value)
-            raise ModelError(f"{word} of {e.name} must be a number, got {got}", e.location)
+            description = "an expression" if isinstance(value, Expression) else describe(value)
+            raise ModelError(f"{word} of {e.name} must be a number, got {description}", e.location)
     if not max(e.low, e.above) <= min(e.high, e.below):
-        raise ModelError(f"{e.label} has an empty range: no number is {e.allowed}", e.location)
+        raise ModelError(f"{e.label} has an empty range: no number is {e.allowed_range}", e.location)
     if isinstance(e, Contact) and is_among(e.slip, analysis.positions):
         raise ModelError(
             f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={analysis.rate[e.slip].name}",
             e.location,
         )
     if isinstance(e, SettableVariable) and not e.accepts(e.start):
-        raise ModelError(f"{e.label} has the start value {e.start!r}; it must be {e.allowed}", e.location)
+        raise ModelError(f"{e.label} has the start value {e.start!r}; it must be {e.allowed_range}", e.location)
 
 
 def _check_printable(name: str, location: tuple[str, int], *words: str) -> None:
@@ -143,7 +143,7 @@ def check_use(analysis: ModelRoles) -> None:
     read: dict[int, Operand] = {}
     for part in (
         *(rule.broken for rule in analysis.rules),
-        *(one for e in analysis.declared for one in analysis.declared_expressions(e)),
+        *(expression for e in analysis.variables for expression in analysis.declared_expressions(e)),
     ):
         subexpressions(part, read)
     read |= {id(table): table for table in analysis.tables if table.is_called}

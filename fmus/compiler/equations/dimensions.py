@@ -38,28 +38,28 @@ def check_units(analysis: ModelAnalysis) -> None:
             if declared_dimensions(parameter) != unit_dimensions(table, "y", table.unit_y):
                 sentence = f"y of {table} is in {table.unit_y}, but {parameter} is in {parameter.unit}"
                 raise ModelError(sentence, table.location)
-    for e in analysis.declared:
-        own, prefix = declared_dimensions(e), f"{e.name} is declared in {e.unit}, but"
+    for e in analysis.variables:
+        dimensions, prefix = declared_dimensions(e), f"{e.name} is declared in {e.unit}, but"
         if isinstance(e, Output):
-            check_dimensions(e, e.expression, own, prefix, memo)
+            check_dimensions(e, e.expression, dimensions, prefix, memo)
         if (
             isinstance(e, (State, Output))
             and e.integrates is not None
-            and own != quotient(declared_dimensions(e.integrates), SECOND)
+            and dimensions != quotient(declared_dimensions(e.integrates), SECOND)
         ):
             raise ModelError(
                 f"{e.name} in {e.unit} cannot be the rate of {e.integrates.name} in {e.integrates.unit}", e.location
             )
         if isinstance(e, State):
-            check_dimensions(e, e.start_expression, own, f"{prefix} its start", memo)
-            check_dimensions(e, e.nominal_velocity, own, f"{prefix} its nominal_velocity", memo)
-            check_dimensions(e, e.constant_rate, quotient(own, SECOND), f"{prefix} its rate", memo)
+            check_dimensions(e, e.start_expression, dimensions, f"{prefix} its start", memo)
+            check_dimensions(e, e.nominal_velocity, dimensions, f"{prefix} its nominal_velocity", memo)
+            check_dimensions(e, e.constant_rate, quotient(dimensions, SECOND), f"{prefix} its rate", memo)
         if isinstance(e, Input) and e.declared_rate is not None:
-            check_dimensions(e, e.declared_rate, quotient(own, SECOND), f"{prefix} its rate", memo)
+            check_dimensions(e, e.declared_rate, quotient(dimensions, SECOND), f"{prefix} its rate", memo)
         if isinstance(e, Contact):
             slip = dimensions_of(e.slip, memo)
             for word, force in ("slide", e.slide), ("hold", e.hold):
-                check_dimensions(e, force, own, f"{prefix} {word}", memo)
+                check_dimensions(e, force, dimensions, f"{prefix} {word}", memo)
             check_dimensions(e, e.eps, slip, f"the slip of {e.name} is in {dimensions_text(slip)}, but eps", memo)
     for rule in analysis.rules:
         dimensions_of(rule.broken, memo)
@@ -77,7 +77,7 @@ def check_dimensions(
 def check_frequencies(analysis: ModelAnalysis) -> None:
     """Check that no frequency in Hz is used as an angular velocity; both have the dimension 1/s."""
     uses: list[tuple[Expression, str, Operand]] = []  # owner, use and value
-    for e in analysis.declared:
+    for e in analysis.variables:
         values: list[tuple[Variable, Operand]] = [(e, e.expression)] if isinstance(e, Output) else []
         if isinstance(e, (State, Output)) and e.integrates is not None:
             values.append((e.integrates, e))
@@ -85,7 +85,11 @@ def check_frequencies(analysis: ModelAnalysis) -> None:
             values.append((e, e.constant_rate))
         if isinstance(e, Input) and e.declared_rate is not None:
             values.append((e, e.declared_rate))
-        uses += [(e, f"{one.name} is in {one.unit}", value) for one, value in values if angle_exponent(one) > 0]
+        uses += [
+            (e, f"{variable.name} is in {variable.unit}", value)
+            for variable, value in values
+            if angle_exponent(variable) > 0
+        ]
         for part in analysis.declared_expressions(e):
             uses += [
                 (term, f"the argument of {term.op} is an angle in rad", term.args[0])
@@ -163,7 +167,7 @@ def unit_hint(unit: str, text: str) -> str:
         return "use K for temperatures and for their differences"
     display, n_degrees = re.subn(r"\bdeg(ree)?s?\b", "deg", unit)
     if n_degrees:
-        symbol = next((name for name, known in UNITS.items() if known.display == display), None)
+        symbol = next((name for name, known_unit in UNITS.items() if known_unit.display == display), None)
         remedy = f', and display="{display}" to show degrees' if symbol else ""
         return f"use {symbol or 'rad'} instead of {display if symbol else 'deg'}{remedy}"
     if unit.strip() in ("", "-"):
@@ -181,9 +185,13 @@ def quotient(a: Dimensions, b: Dimensions) -> Dimensions:
 
 def dimensions_text(dimensions: Dimensions | None) -> str:
     """Format exponents, for example as kg m/s^2."""
-    named = list(zip(DIMENSIONS, dimensions or DIMENSIONLESS, strict=True))
-    above, below = ([n if abs(p) == 1 else f"{n}^{abs(p)}" for n, p in named if sign * p > 0] for sign in (1, -1))
-    return " ".join(above or ["1"]) + "".join(f"/{unit}" for unit in below) if above or below else "1"
+    powers = list(zip(DIMENSIONS, dimensions or DIMENSIONLESS, strict=True))
+    numerator, denominator = (
+        [n if abs(p) == 1 else f"{n}^{abs(p)}" for n, p in powers if sign * p > 0] for sign in (1, -1)
+    )
+    return (
+        " ".join(numerator or ["1"]) + "".join(f"/{unit}" for unit in denominator) if numerator or denominator else "1"
+    )
 
 
 def dimensions_of(e: Operand, memo: dict[int, Dimensions | None]) -> Dimensions | None:
@@ -270,14 +278,14 @@ def axes(table: Table) -> tuple[tuple[str, str], tuple[str, str]]:
 
 def unit_dimensions(table: Table, word: str, unit: str) -> Dimensions:
     """Return the exponents of the unit of one axis of a table."""
-    if (parsed := parse_unit(unit)) is None:
+    if (parsed_unit := parse_unit(unit)) is None:
         hint = unit_hint(unit, "") or "convert its numbers to a product or a quotient of SI units"
         axis = f"{word} of the table {table}"
         if table.file:
             heading = table.headings[("x", "y").index(word)]
             axis = f"{table.file.name}: the column {heading}, {axis},"
         raise ModelError(f"{axis} has the unit {unit!r}: {hint}", table.location)
-    return tuple(Fraction(getattr(parsed, base)) for base in DIMENSIONS)
+    return tuple(Fraction(getattr(parsed_unit, base)) for base in DIMENSIONS)
 
 
 def expression_text(e: Operand, level: int = 0) -> str:
@@ -294,7 +302,7 @@ def expression_text(e: Operand, level: int = 0) -> str:
         if n_left == 0:
             return "..."
         n_left -= 1
-        own = PRECEDENCE.get(e.op, 4)
+        precedence = PRECEDENCE.get(e.op, 4)
         if call := find_table_call(e):
             return f"{call[0]}({text(call[1], 0)})"
         if e.op == "choose" and is_absolute_value(e):
@@ -302,9 +310,9 @@ def expression_text(e: Operand, level: int = 0) -> str:
         elif e.op == "neg":
             result = f"-{text(e.args[0], 3)}"
         elif e.op in PRECEDENCE:
-            result = f"{text(e.args[0], own)} {e.op} {text(e.args[1], own + (e.op in '-/'))}"
+            result = f"{text(e.args[0], precedence)} {e.op} {text(e.args[1], precedence + (e.op in '-/'))}"
         else:
             result = f"{e.op}({', '.join(text(argument, 0) for argument in e.args)})"
-        return f"({result})" if own < level else result
+        return f"({result})" if precedence < level else result
 
     return text(e, level)

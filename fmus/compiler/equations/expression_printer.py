@@ -50,15 +50,15 @@ class ExpressionPrinter:
 
     def __init__(
         self,
-        given: Mapping[Expression, str],
-        kept: Collection[Expression],
-        taken: Collection[str],
+        bound_names: Mapping[Expression, str],
+        constants: Collection[Expression],
+        used_names: Collection[str],
         depth: int,
         names: Mapping[Expression, str] | None = None,
         on_trial: Collection[Expression] = (),
     ) -> None:
-        self.bound_names, self.used_names = dict(given), set(taken)
-        self.constants = {id(e) for e in kept}
+        self.bound_names, self.used_names = dict(bound_names), set(used_names)
+        self.constants = {id(e) for e in constants}
         self.lines: list[str] = []
         self.depth = depth
         self.names = {} if names is None else names
@@ -70,7 +70,7 @@ class ExpressionPrinter:
         self._use_counts: Counter[int] = Counter()
         self._value_numbers: dict[tuple[Any, ...], int] = {}  # equal expressions share a value number
         self._number_by_id: dict[int, int] = {}
-        self._kept_alive: list[Operand] = []  # keeps id() unique
+        self._live_operands: list[Operand] = []  # keeps id() unique
         self._branches_in_both_cases: dict[int, list[Operand]] = {}  # by value number
         self._is_on_trial: dict[int, bool] = {id(e): True for e in on_trial}
         self._signs = Signs()
@@ -142,7 +142,7 @@ class ExpressionPrinter:
             number = self.value_number(e.expression)
         else:
             number = self._value_numbers.setdefault(key, len(self._value_numbers))
-        self._kept_alive.append(e)
+        self._live_operands.append(e)
         self._number_by_id[id(e)] = number
         name = self.name_of(e)
         if name and (isinstance(e, VariableDeclaration) or number not in self.author_names):
@@ -315,11 +315,13 @@ class ExpressionPrinter:
         return ast.Call(ast.Name(e.op), args, [])
 
     def _depends_on_trial(self, e: Operand) -> bool:
-        known = self._is_on_trial
-        for part in operands_first(e, operands_of=lambda part: () if id(part) in known else operands(part)):
-            known[id(part)] = known.get(id(part), False) or any(known[id(operand)] for operand in operands(part))
-            self._kept_alive.append(part)
-        return known[id(e)]
+        is_on_trial = self._is_on_trial
+        for part in operands_first(e, operands_of=lambda part: () if id(part) in is_on_trial else operands(part)):
+            is_on_trial[id(part)] = is_on_trial.get(id(part), False) or any(
+                is_on_trial[id(operand)] for operand in operands(part)
+            )
+            self._live_operands.append(part)
+        return is_on_trial[id(e)]
 
     def _build_guarded_call(self, e: Term, argument: ast.expr) -> ast.expr:
         """Return the function value, or NaN outside its domain."""

@@ -59,7 +59,7 @@ class ModelAnalysis(ContactAnalysis):
         They come first, because other rules may divide by the same parameters.
         """
         result: dict[Expression, Rule] = {}
-        for owner in self.declared:
+        for owner in self.variables:
             for quotient in unconditional_quotients(self.declared_expressions(owner)):
                 for e in factors(quotient.args[1]):
                     if isinstance(e, (Parameter, Fixed)) and e.accepts(0.0) and e not in result:
@@ -74,19 +74,22 @@ class ModelAnalysis(ContactAnalysis):
         for s in (*self.states, *self.drivers):
             e = s.nominal_velocity
             if e is not None and not (isinstance(e, (Parameter, Fixed)) and e.above >= 0.0):
-                broken = Term("<=", e, 0.0)
-                broken.location = s.location
-                values = ", ".join(f"{one.label} = {{{one.name}!r}}" for one in variables_in(e)) or repr(e)
-                result.append(Rule(broken, f"nominal_velocity of {s.name} must be above 0, got {values}"))
+                comparison = Term("<=", e, 0.0)
+                comparison.location = s.location
+                values = ", ".join(f"{variable.label} = {{{variable.name}!r}}" for variable in variables_in(e)) or repr(
+                    e
+                )
+                result.append(Rule(comparison, f"nominal_velocity of {s.name} must be above 0, got {values}"))
         return result
 
     @property
     def checks_event_steps(self) -> bool:
         """Whether a long step may miss how forces vary: by steep friction laws, or conditions inside of it."""
         laws = [c.slide for c in self.contacts]
-        moving = dependents(laws, self.states)
+        dependent_ids = dependents(laws, self.states)
         steep_laws = any(
-            isinstance(e, Term) and e.op in STEEP_FUNCTIONS and id(e.args[-1]) in moving for e in operands_first(*laws)
+            isinstance(e, Term) and e.op in STEEP_FUNCTIONS and id(e.args[-1]) in dependent_ids
+            for e in operands_first(*laws)
         )
         return steep_laws or not all(condition.is_frozen for condition in self.switches)
 
@@ -109,9 +112,9 @@ class ModelAnalysis(ContactAnalysis):
         def operands_outside(e: Operand) -> tuple[Operand, ...]:
             return () if isinstance(e, Term) and e.op in PERIODIC else operands(e)
 
-        outside = {id(e) for e in operands_first(*equations, *margins, operands_of=operands_outside)}
-        inside = {id(e) for e in operands_first(*equations)}
-        return [s for s in self.states if s.unit == "rad" and id(s) in inside - outside]
+        outside_ids = {id(e) for e in operands_first(*equations, *margins, operands_of=operands_outside)}
+        inside_ids = {id(e) for e in operands_first(*equations)}
+        return [s for s in self.states if s.unit == "rad" and id(s) in inside_ids - outside_ids]
 
     def _keeps_closed_form(self, e: Input) -> bool:
         """Return whether breakaway and motion keep their closed form while the input changes."""

@@ -40,7 +40,7 @@ class Solver(Integrator):
 
 
 class {name}({base_class}):
-    """{about}"""
+    """{docstring}"""
 
 {declaration_lines}
 
@@ -61,7 +61,7 @@ def model_source(analysis: ModelAnalysis, file: str) -> str:
     """Return the source of the module."""
     context = CodegenContext(analysis)
     first, _, remainder = escape_docstring(cleandoc(analysis.model.__doc__ or "")).partition("\n")
-    about = indent(f"{first}\n{remainder}" + ("\n" if remainder else ""), INDENT).strip(" ")
+    docstring = indent(f"{first}\n{remainder}" + ("\n" if remainder else ""), INDENT).strip(" ")
     text = MODULE_TEMPLATE.format(
         first=first,
         file=file,
@@ -70,7 +70,7 @@ def model_source(analysis: ModelAnalysis, file: str) -> str:
         items="(EXACT_ITEM, *METHOD_ITEMS)" if analysis.closed_form else "METHOD_ITEMS",
         name=analysis.name,
         base_class=base_class(analysis).__name__,
-        about=about.rstrip(" ") + (INDENT if remainder else ""),
+        docstring=docstring.rstrip(" ") + (INDENT if remainder else ""),
         declaration_lines=indent("\n".join(declaration_lines(analysis)), INDENT),
         class_attribute_lines=indent("\n".join(class_attribute_lines(analysis)), INDENT),
         methods="\n\n".join(
@@ -119,7 +119,7 @@ def slips_of_contacts(analysis: ModelAnalysis) -> dict[str, str]:
 
 def flags(analysis: ModelAnalysis) -> dict[str, bool]:
     """Return the flags of the model class, apart from those of its base class."""
-    moving = (*analysis.time_varying, *analysis.input_rates)
+    varying_symbols = (*analysis.time_varying, *analysis.input_rates)
     return {
         "is_linear": bool(analysis.closed_form),
         "has_other_laws": bool(analysis.laws[1:]),
@@ -132,16 +132,16 @@ def flags(analysis: ModelAnalysis) -> dict[str, bool]:
         "checks_event_steps": analysis.checks_event_steps,
         "has_nominal_velocity": any(s.nominal_velocity is not None for s in (*analysis.states, *analysis.drivers)),
         "has_variable_levers": bool(not analysis.rests_when_stuck and analysis.variable_lever_contacts),
-        "has_slip_conditions": any(has_condition_on(c.slip, moving) for c in analysis.contacts),
+        "has_slip_conditions": any(has_condition_on(c.slip, varying_symbols) for c in analysis.contacts),
     }
 
 
 def import_lines(text: str) -> str:
     """Return the import lines for all names used in the text."""
-    used = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
-    lines = [f"from math import {', '.join(names)}\n"] if (names := sorted(used & set(MATH))) else []
+    used_names = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    lines = [f"from math import {', '.join(names)}\n"] if (names := sorted(used_names & set(MATH))) else []
     for module, available in IMPORTS.items():
-        if names := [name for name in available if name in used]:
+        if names := [name for name in available if name in used_names]:
             lines.append(f"from {f'.runtime.{module}'.rstrip('.')} import {', '.join(names)}")
     return "\n".join(lines)
 
@@ -175,11 +175,11 @@ def output_declaration(analysis: ModelAnalysis, e: Variable) -> str:
     return declaration(e, **options)
 
 
-def declaration(e: Variable, **more: object) -> str:
+def declaration(e: Variable, **overrides: object) -> str:
     """Return the declaration of a variable, with the attributes that differ from their defaults."""
     texts = [string_literal(e.unit), string_literal(e.text)]
     for name in DECLARED_ATTRIBUTES:
-        value, default = more.get(name, getattr(e, name)), getattr(VariableDeclaration, name)
+        value, default = overrides.get(name, getattr(e, name)), getattr(VariableDeclaration, name)
         if not e.is_integer and (name == "start" or name in OPTIONS):  # a number of numpy as one of Python
             value = float(e.start) if name == "start" else OPTIONS[name].type(value)
         if repr(value) != repr(default):
@@ -216,16 +216,16 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
         if (value := float(getattr(analysis.model, attribute))) != getattr(Oscillator, attribute):
             lines.append(f"{attribute} = {value!r}")
     if analysis.rules or analysis.limits:
-        inherited = [f"{INDENT}**{base_class(analysis).__name__}.rules,"] if analysis.contacts else []
+        inherited_rules = [f"{INDENT}**{base_class(analysis).__name__}.rules,"] if analysis.contacts else []
         messages = [rule.sentence for rule in analysis.rules] + [limit.sentence for limit in analysis.limits]
         sentences = [f"{INDENT}{rule_status(n)}: {string_lines(message)}," for n, message in enumerate(messages)]
-        lines += ["rules = {", *inherited, *sentences, "}"]
+        lines += ["rules = {", *inherited_rules, *sentences, "}"]
     return lines
 
 
 def rate_names(e: Input) -> str:
     """Return the names of the inputs in the declared rate of an input; the rate itself if there are none."""
-    inputs = [one.name for one in variables_in(e.declared_rate) if isinstance(one, Input)]
+    inputs = [variable.name for variable in variables_in(e.declared_rate) if isinstance(variable, Input)]
     return " and ".join(inputs) or expression_text(e.declared_rate)
 
 
@@ -248,7 +248,7 @@ def condition_unit(analysis: ModelAnalysis, condition: Condition, memo: dict[int
     dimensions = next((d for e in condition.sides if (d := dimensions_of(e, memo)) is not None), DIMENSIONLESS)
     variables = [e for e in condition.sides if isinstance(e, Variable)]
     if dimensions != DIMENSIONLESS:
-        variables += analysis.declared
+        variables += analysis.variables
     return next((e.unit for e in variables if declared_dimensions(e) == dimensions), "1")
 
 

@@ -57,7 +57,7 @@ def find_conditions(
     Equal ones are one condition.  The slips of `contacts` have the signs of their modes.
     """
     varying, targets = tuple(varying), tuple(targets)
-    moving = dependents(targets, varying)
+    dependent_ids = dependents(targets, varying)
     terms = [e for target in targets for e in subexpressions(target).values() if isinstance(e, Term)]
     terms = list({id(e): e for e in terms}.values())
     groups: list[list[Term]] = []
@@ -75,27 +75,27 @@ def find_conditions(
         group_by_hash[e.structure_hash].append(groups[-1])
 
     for e in terms:
-        if (e.op in COMPARISONS or is_piece(e)) and id(e) in moving:
+        if (e.op in COMPARISONS or is_piece(e)) and id(e) in dependent_ids:
             if (group := find_group(e)) is None:
                 add_group(e)
             else:
                 group.append(e)
-    visited: set[int] = set()
+    visited_ids: set[int] = set()
     margins = []
     for group in groups:  # grows: a kink may lie within another one
         margins.append(sign_slips(group[0].args[0], contacts) if is_piece(group[0]) else comparison_margin(group[0]))
-        for e in kinks(margins[-1], visited):
+        for e in kinks(margins[-1], visited_ids):
             side = Term(">", e.args[0], 0.0)
             side.location = e.location
-            if id(e) in moving and find_group(side) is None:
+            if id(e) in dependent_ids and find_group(side) is None:
                 add_group(side)
-    protecting = protected_comparisons(targets, varying)
+    protected_ids = protected_comparisons(targets, varying)
     # A search on a polynomial would pass the narrow dip of fabs(u) - b without a zero; u itself has none.
     margins = replace_absolute_values(margins, lambda kink, _: find_side(kink))
     return [
-        Condition(one, group[0].args, tuple(group), protecting.isdisjoint(map(id, group)))
+        Condition(condition_margin, group[0].args, tuple(group), protected_ids.isdisjoint(map(id, group)))
         for group, margin in zip(groups, margins, strict=True)
-        for one in (piece_margins(group[0], margin) if is_piece(group[0]) else (margin,))
+        for condition_margin in (piece_margins(group[0], margin) if is_piece(group[0]) else (margin,))
     ]
 
 
@@ -129,11 +129,11 @@ def table_limits(targets: Iterable[Operand], forces: Collection[Expression]) -> 
                     'declare ends="hold" or ends="continue"',
                     e.location,
                 )
-            same = pieces.setdefault(e.structure_hash, [])
-            if not any(is_same_expression(e, piece) for piece in same):
-                same.append(e)
+            equal_pieces = pieces.setdefault(e.structure_hash, [])
+            if not any(is_same_expression(e, piece) for piece in equal_pieces):
+                equal_pieces.append(e)
     result = []
-    for piece in (piece for same in pieces.values() for piece in same):
+    for piece in (piece for equal_pieces in pieces.values() for piece in equal_pieces):
         table, (u,) = table_of(piece), piece.args
         for margin, event, x in (
             (Term("-", u, table.x[0]), "falls below the first", table.x[0]),
@@ -146,18 +146,18 @@ def table_limits(targets: Iterable[Operand], forces: Collection[Expression]) -> 
     return result
 
 
-def kinks(e: Operand, visited: set[int]) -> list[Term]:
+def kinks(e: Operand, visited_ids: set[int]) -> list[Term]:
     """Return the absolute values in an expression that were not visited yet; those inside of others come first."""
-    parts = operands_first(e, operands_of=lambda part: () if id(part) in visited else operands(part))
-    result = [term for term in parts if isinstance(term, Term) and term.op == "fabs" and id(term) not in visited]
-    visited.update(map(id, parts))
+    parts = operands_first(e, operands_of=lambda part: () if id(part) in visited_ids else operands(part))
+    result = [term for term in parts if isinstance(term, Term) and term.op == "fabs" and id(term) not in visited_ids]
+    visited_ids.update(map(id, parts))
     return result
 
 
 def replace_absolute_values(
     expressions: Sequence[Operand],
     comparison: Callable[[Term, Operand], Term | None],
-    unchanged: Collection[Expression] = (),
+    unchanged_outputs: Collection[Expression] = (),
 ) -> list[Operand]:
     """Return expressions with choose() in place of absolute values.
 
@@ -167,7 +167,7 @@ def replace_absolute_values(
         Expressions, which are not changed.
     comparison
         Gets an absolute value and its new operand u; returns the condition u > 0, or None to keep the absolute value.
-    unchanged
+    unchanged_outputs
         Outputs that expressions continue to contain.
     """
     result: Memo = {}
@@ -178,7 +178,7 @@ def replace_absolute_values(
             if (condition := comparison(part, u)) is not None:
                 new = Term("choose", condition, u, Term("neg", u))
                 new.location = part.location
-        result[id(part)] = part if isinstance(part, Output) and part in unchanged else new
+        result[id(part)] = part if isinstance(part, Output) and part in unchanged_outputs else new
     return [result[id(e)] for e in expressions]
 
 
@@ -194,21 +194,21 @@ def add_liftoff(model: type[Model]) -> None:
         if c.hold is not None and depends_on(c.slide, (c.mode,)):
             forward, backward = (while_positive(substitute(c.slide, {c.mode: mode}), c) for mode in (1.0, -1.0))
             c.hold = while_positive(c.hold, c)
-            c.slide = located(Term("choose", located(Term(">", c.mode, 0.0), c), forward, backward), c)
+            c.slide = set_location(Term("choose", set_location(Term(">", c.mode, 0.0), c), forward, backward), c)
         else:
-            touches = located(Term(">", c.slide, 0.0), c)
-            c.slide = located(Term("choose", touches, c.slide, 0.0), c)
-            c.hold = None if c.hold is None else located(Term("choose", touches, c.hold, 0.0), c)
+            touches = set_location(Term(">", c.slide, 0.0), c)
+            c.slide = set_location(Term("choose", touches, c.slide, 0.0), c)
+            c.hold = None if c.hold is None else set_location(Term("choose", touches, c.hold, 0.0), c)
 
 
 def while_positive(e: Operand, owner: Expression) -> Operand:
     """Return an expression where it is positive, else 0."""
     if not isinstance(e, Expression):
         return e
-    return located(Term("choose", located(Term(">", e, 0.0), owner), e, 0.0), owner)
+    return set_location(Term("choose", set_location(Term(">", e, 0.0), owner), e, 0.0), owner)
 
 
-def located(e: Term, owner: Expression) -> Term:
+def set_location(e: Term, owner: Expression) -> Term:
     """Give a term the location of a declaration in the model file."""
     e.location = owner.location
     return e
@@ -220,9 +220,9 @@ def locate_kinks(model: type[Model]) -> None:
     A limit mu |N| falls to zero and rises again where N changes its sign, and a load may have a cusp; a search would
     not find the dip.  The kinks of |slip| and of drag |v| v need no events of their own.
     """
-    declared = list(vars(model).values())
-    contacts = [e for e in declared if isinstance(e, Contact)]
-    positions = [e.integrates for e in declared if isinstance(e, State) and e.integrates is not None]
+    attributes = list(vars(model).values())
+    contacts = [e for e in attributes if isinstance(e, Contact)]
+    positions = [e.integrates for e in attributes if isinstance(e, State) and e.integrates is not None]
     speeds = [
         s
         for c in contacts
@@ -231,8 +231,8 @@ def locate_kinks(model: type[Model]) -> None:
     ]
     if not contacts:
         return
-    outputs = {e for e in declared if isinstance(e, Output)}
-    slots: list[tuple[Variable, str]] = [(e, "expression") for e in declared if isinstance(e, Output)]
+    outputs = {e for e in attributes if isinstance(e, Output)}
+    slots: list[tuple[Variable, str]] = [(e, "expression") for e in attributes if isinstance(e, Output)]
     slots += [(c, name) for c in contacts for name in ("slide", "hold")]
     expressions = [getattr(e, name) for e, name in slots]
     leaves = [e for e in operands_first(*expressions) if isinstance(e, Variable) and not isinstance(e, Output)]
@@ -251,11 +251,11 @@ def locate_kinks(model: type[Model]) -> None:
 
 def is_absolute_value(e: Term) -> bool:
     """Return whether a term is choose(u > 0, u, -u)."""
-    condition, this, that = e.args
+    condition, true_case, false_case = e.args
     return (
-        is_lower_bound(condition, this)
+        is_lower_bound(condition, true_case)
         and is_constant(condition.args[1], 0.0)
-        and is_same_expression(that, Term("neg", this))
+        and is_same_expression(false_case, Term("neg", true_case))
     )
 
 
@@ -274,27 +274,30 @@ def protected_comparisons(targets: Collection[Operand], varying: Collection[Expr
     They must be evaluated where the operation is.  These are the conditions around the operation and those inside its
     operand, if they depend on what the operand depends on.
     """
-    moving = dependents(targets, varying)
+    dependent_ids = dependents(targets, varying)
     order = operands_first(*targets)
     bits = {id(e): 1 << n for n, e in enumerate(varying)}
-    related: dict[int, int] = {}  # bits of the variables on which an expression depends
-    needed: dict[int, int] = {}  # bits of the variables that decide whether its operations have a value
+    dependencies: dict[int, int] = {}  # bits of the variables on which an expression depends
+    domain_dependencies: dict[int, int] = {}  # bits of the variables that decide whether its operations have a value
     for e in order:
-        related[id(e)], needed[id(e)] = bits.get(id(e), 0), 0
+        dependencies[id(e)], domain_dependencies[id(e)] = bits.get(id(e), 0), 0
         for operand in operands(e):
-            related[id(e)] |= related[id(operand)]
-            needed[id(e)] |= needed[id(operand)]
+            dependencies[id(e)] |= dependencies[id(operand)]
+            domain_dependencies[id(e)] |= domain_dependencies[id(operand)]
         if isinstance(e, Term) and e.op in LIMITED_DOMAIN:
-            needed[id(e)] |= related[id(e.args[-1])]
+            domain_dependencies[id(e)] |= dependencies[id(e.args[-1])]
     chooses = [e for e in order if isinstance(e, Term) and e.op == "choose"]
-    around = [
+    outer_comparisons = [
         e.args[0]
         for e in chooses
-        if any(related[id(e.args[0])] & needed[id(case)] for case in e.args[1:]) and isinstance(e.args[0], Term)
+        if any(dependencies[id(e.args[0])] & domain_dependencies[id(case)] for case in e.args[1:])
+        and isinstance(e.args[0], Term)
     ]
-    operations = [e for e in order if isinstance(e, Term) and e.op in LIMITED_DOMAIN and id(e.args[-1]) in moving]
-    inside = [e for e in operands_first(*operations) if isinstance(e, Term) and e.op in COMPARISONS]
-    return {id(e) for e in (*around, *inside)}
+    operations = [
+        e for e in order if isinstance(e, Term) and e.op in LIMITED_DOMAIN and id(e.args[-1]) in dependent_ids
+    ]
+    inner_comparisons = [e for e in operands_first(*operations) if isinstance(e, Term) and e.op in COMPARISONS]
+    return {id(e) for e in (*outer_comparisons, *inner_comparisons)}
 
 
 class Signs:
@@ -303,7 +306,7 @@ class Signs:
     def __init__(self) -> None:
         self._nonnegative: dict[int, bool] = {}
         self._nonpositive: dict[int, bool] = {}
-        self._visited: list[Operand] = []  # keeps id() unique
+        self._visited_operands: list[Operand] = []  # keeps id() unique
 
     def is_nonnegative(self, e: Operand) -> bool:
         """Return whether the form of an expression shows that it is never negative."""
@@ -321,7 +324,7 @@ class Signs:
     def _visit(self, e: Operand) -> None:
         for part in operands_first(e, operands_of=lambda part: () if id(part) in self._nonnegative else operands(part)):
             if id(part) not in self._nonnegative:
-                self._visited.append(part)
+                self._visited_operands.append(part)
                 self._nonpositive[id(part)] = self._has_nonpositive_form(part)
                 self._nonnegative[id(part)] = self._has_nonnegative_form(part)
 

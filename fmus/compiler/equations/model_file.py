@@ -120,7 +120,7 @@ class ModelFile:
         return BuildError(f"{location}: {mistake}.")
 
 
-_loaded: dict[Path, ModelFile] = {}
+_model_files: dict[Path, ModelFile] = {}
 
 
 def load_model_file(path: Path) -> ModelFile:
@@ -129,9 +129,9 @@ def load_model_file(path: Path) -> ModelFile:
         source = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise BuildError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
-    cached = _loaded.get(path.resolve())
-    if cached is None or (cached.path, cached.source) != (path, source):
-        cached = _loaded[path.resolve()] = ModelFile(path, source)
-    elif "analysis" in vars(cached) and any(table.has_changed() for table in cached.analysis.tables):
-        cached = _loaded[path.resolve()] = ModelFile(path, source, revision=cached.revision + 1)
-    return cached
+    model_file = _model_files.get(path.resolve())
+    if model_file is None or (model_file.path, model_file.source) != (path, source):
+        model_file = _model_files[path.resolve()] = ModelFile(path, source)
+    elif "analysis" in vars(model_file) and any(table.has_changed() for table in model_file.analysis.tables):
+        model_file = _model_files[path.resolve()] = ModelFile(path, source, revision=model_file.revision + 1)
+    return model_file

@@ -11,7 +11,7 @@ from ...runtime.codes import MAX_INPUT_ORDER
 from .algebra import depends_on, differentiate, has_condition_on, is_same_expression, variables_in
 from .expressions import Expression, ModelError, Operand, describe, is_among
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
-from .reserved_names import RESERVED, check_name, is_reserved_in_c
+from .reserved_names import RESERVED_NAMES, check_name, is_reserved_in_c
 from .tables import Table
 
 TIME = Expression()
@@ -24,16 +24,16 @@ class ModelRoles:
     def __init__(self, model: type[Model], has_input_derivatives: bool = False) -> None:
         self.model, self.name = model, model.__name__
         self.names: dict[Expression, str] = {}  # of derived terms
-        if self.name in RESERVED or is_reserved_in_c(self.name) or not self.name.isascii():
+        if self.name in RESERVED_NAMES or is_reserved_in_c(self.name) or not self.name.isascii():
             raise ModelError(
                 f"the class name {self.name} is reserved or not ASCII: choose another name", model.location
             )
         # an alias such as D for mu_s does not count
-        self.named = [e for name, e in vars(model).items() if isinstance(e, Expression) and e.name == name]
-        for e in self.named:
+        self.named_expressions = [e for name, e in vars(model).items() if isinstance(e, Expression) and e.name == name]
+        for e in self.named_expressions:
             check_name(e.name, e)
-        self.declared: list[Variable] = [e for e in self.named if isinstance(e, Variable)]
-        self.tables = [e for e in self.named if isinstance(e, Table)]
+        self.variables: list[Variable] = [e for e in self.named_expressions if isinstance(e, Variable)]
+        self.tables = [e for e in self.named_expressions if isinstance(e, Table)]
         self.parameters = self._of_type(Parameter, Fixed)
         self.choices, self.inputs = self._of_type(Choice), self._of_type(Input)
         self.drivers = [
@@ -70,7 +70,7 @@ class ModelRoles:
         return differentiate(e, by, self.names)
 
     def _of_type(self, *kinds: type) -> list[Any]:
-        return [e for e in self.declared if isinstance(e, kinds)]
+        return [e for e in self.variables if isinstance(e, kinds)]
 
     def _add_driver_rates(self) -> None:
         """Add an output for the rate of each state with a given rate.
@@ -82,16 +82,16 @@ class ModelRoles:
                 unit = s.constant_rate.unit if isinstance(s.constant_rate, Variable) else f"{s.unit}/s"
                 law = Output(unit, f"rate of {s.name}", s.constant_rate, rate_of=s)
                 law.name, law.location = f"{s.name}_rate", s.location
-                if any(e.name == law.name for e in self.declared):
+                if any(e.name == law.name for e in self.variables):
                     raise ModelError(
                         f"the name {law.name} is reserved for the rate of {s.name}: choose another name", s.location
                     )
-                self.declared.append(law)
+                self.variables.append(law)
 
     def _find_rates(self) -> None:
         """Find the rate of every state; it may be another state."""
         self.rate: dict[State, State | Output] = {}
-        for e in self.declared:
+        for e in self.variables:
             if isinstance(e, (State, Output)) and e.integrates is not None:
                 if not is_among(e.integrates, self.states):
                     integrates = getattr(e.integrates, "name", "") or describe(e.integrates)
@@ -99,8 +99,8 @@ class ModelRoles:
                         f"rate_of of {e.name} is {integrates}, which is not a state of the model", e.location
                     )
                 if e.integrates in self.rate:
-                    both = f"{e.name} and {self.rate[e.integrates].name}"
-                    raise ModelError(f"{both} both declare rate_of={e.integrates.name}", e.location)
+                    names = f"{e.name} and {self.rate[e.integrates].name}"
+                    raise ModelError(f"{names} both declare rate_of={e.integrates.name}", e.location)
                 self.rate[e.integrates] = e
         for s in self.states:
             if s not in self.rate:
@@ -135,7 +135,9 @@ class ModelRoles:
         """Return the order of the polynomial that continues each input with a declared rate."""
         orders: dict[Input, int] = {}
         for e in self.prescribed_inputs:  # a rate is declared before its input
-            order_of_rate = max((orders[one] for one in orders if depends_on(e.declared_rate, (one,))), default=0)
+            order_of_rate = max(
+                (orders[variable] for variable in orders if depends_on(e.declared_rate, (variable,))), default=0
+            )
             orders[e] = min(1 + order_of_rate, MAX_INPUT_ORDER)
         return orders
 
@@ -144,13 +146,13 @@ class ModelRoles:
 
         An input with a range may not leave it, and one that is the rate of another input would raise its order.
         """
-        is_taken = any(variable.name in derivative_names(e) for variable in self.declared)
-        is_rate = any(depends_on(one.declared_rate, (e,)) for one in self.prescribed_inputs)
+        is_taken = any(variable.name in derivative_names(e) for variable in self.variables)
+        is_rate = any(depends_on(variable.declared_rate, (e,)) for variable in self.prescribed_inputs)
         return not is_taken and not is_rate and not has_range(e)
 
     def is_ramp(self, e: Operand) -> bool:
         """Return whether an expression is linear in time as far as it depends on inputs with declared rates."""
-        return not depends_on(e, [one for one, order in self.input_orders.items() if order > 1])
+        return not depends_on(e, [variable for variable, order in self.input_orders.items() if order > 1])
 
     def _check_declared_rate(self, e: Input) -> None:
         """Raise ModelError for a rate by which an input cannot be continued as a polynomial in time."""
@@ -159,14 +161,16 @@ class ModelRoles:
                 f"{e.name} has a rate and a range, but its rate may lead out of the range: remove one of them",
                 e.location,
             )
-        for variable in self.declared:
+        for variable in self.variables:
             if variable.name in derivative_names(e):
                 raise ModelError(
                     f"the name {variable.name} is reserved for the derivatives of {e.name}: choose another name",
                     variable.location,
                 )
         others = [
-            one for one in variables_in(e.declared_rate) if not isinstance(one, (Input, Parameter, Fixed, Choice))
+            variable
+            for variable in variables_in(e.declared_rate)
+            if not isinstance(variable, (Input, Parameter, Fixed, Choice))
         ]
         if others:
             raise ModelError(
@@ -174,7 +178,7 @@ class ModelRoles:
                 f"parameters; otherwise declare {e.name} as a State",
                 e.location,
             )
-        slopes = [differentiate(e.declared_rate, {one: 1.0}) for one in self.inputs]
+        slopes = [differentiate(e.declared_rate, {variable: 1.0}) for variable in self.inputs]
         if has_condition_on(e.declared_rate, self.inputs) or any(depends_on(slope, self.inputs) for slope in slopes):
             raise ModelError(
                 f"rate of {e.name} must be linear in the inputs: declare {e.name} as a State with this rate", e.location
@@ -184,7 +188,7 @@ class ModelRoles:
     def rate_inputs(self) -> dict[str, list[str]]:
         """Names of the inputs on which the declared rate of each input depends; without inputs of constant rate 0."""
         return {
-            e.label: [one.label for one in variables_in(e.declared_rate) if isinstance(one, Input)]
+            e.label: [variable.label for variable in variables_in(e.declared_rate) if isinstance(variable, Input)]
             for e in self.prescribed_inputs
             if not is_same_expression(e.declared_rate, 0.0)
         }
@@ -220,7 +224,7 @@ class ModelRoles:
     def ordered_outputs(self) -> list[Variable]:
         """Outputs in the order of the model description: states, rates, drivers, others, modes."""
         rates = [self.rate[s] for s in self.dynamic_states]
-        others = [e for e in self.declared if isinstance(e, (Output, Contact)) and not is_among(e, rates)]
+        others = [e for e in self.variables if isinstance(e, (Output, Contact)) and not is_among(e, rates)]
         return [*self.states, *rates, *self.drivers, *others, *self.modes]
 
 

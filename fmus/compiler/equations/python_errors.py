@@ -13,13 +13,15 @@ from . import expressions, model_declaration, tables
 from .expressions import FUNCTIONS, NO_VALUE, ModelError
 from .model_declaration import Model, Rule, Variable, signature_text
 
-OFFERED = {
-    name: one
+EXPORTED_OBJECTS = {
+    name: value
     for module in (expressions, model_declaration, tables)
-    for name, one in vars(module).items()
+    for name, value in vars(module).items()
     if name in EXPORTED_NAMES
 }
-DECLARATIONS = [name for name, one in OFFERED.items() if isinstance(one, type) and issubclass(one, (Variable, Rule))]
+DECLARATIONS = [
+    name for name, value in EXPORTED_OBJECTS.items() if isinstance(value, type) and issubclass(value, (Variable, Rule))
+]
 MISSING_FUNCTIONS = ("floor", "ceil", "trunc", "fmod", "atan2", "hypot", "log10", "log2", "pow", "cbrt")  # of math
 OTHER_NAMES = {  # arguments of other programs and of earlier versions -> the argument that has this meaning
     **dict.fromkeys(("min", "minimum", "lower"), "low"),
@@ -84,8 +86,8 @@ def explain_call(tree: ast.Module, frame: FrameSummary) -> str:
     for call in ast.walk(tree):
         if isinstance(call, ast.Call) and (call.lineno, call.col_offset) == (frame.lineno, frame.colno):
             name = getattr(call.func, "id", getattr(call.func, "attr", ""))
-            if callable(OFFERED.get(name)):
-                return explain_arguments(name, OFFERED[name], call)
+            if callable(EXPORTED_OBJECTS.get(name)):
+                return explain_arguments(name, EXPORTED_OBJECTS[name], call)
     return ""
 
 
@@ -105,10 +107,10 @@ def explain_arguments(name: str, function: Any, call: ast.Call) -> str:
             close = [OTHER_NAMES.get(word, ""), *get_close_matches(word, arguments, 1)]
             nearest = next((f", the nearest is {argument}" for argument in close if argument in arguments), "")
             return f"{name} has no argument {word}{nearest}: {usage}"
-    if missing := [
+    if missing_names := [
         argument.name for argument in by_position if argument.default is argument.empty and argument.name not in names
     ]:
-        return f"{name} lacks the argument {' and '.join(missing)}: {usage}"
+        return f"{name} lacks the argument {' and '.join(missing_names)}: {usage}"
     return ""
 
 

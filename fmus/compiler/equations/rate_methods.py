@@ -46,8 +46,8 @@ def rates_method(context: CodegenContext, of_terms: bool = False) -> str:
     elif c is not None:
         context.emit_driver(printer, [*targets, analysis.load[c]])
         printer.count_uses(*targets, analysis.load[c], c.slide, c.slide, analysis.holding_limit[c])
-        sliding = printer.text(Term("*", c.mode, c.slide))
-        printer.emit(f"{c.name} = {sliding} if {c.mode.name} != 0 else {threshold_call(context, printer, c)}")
+        sliding_force = printer.text(Term("*", c.mode, c.slide))
+        printer.emit(f"{c.name} = {sliding_force} if {c.mode.name} != 0 else {threshold_call(context, printer, c)}")
         printer.bound_names[c] = c.name
         return method_source(name, context.arguments, emit_return(printer, targets))
     elif analysis.contacts:
@@ -85,10 +85,12 @@ def jacobian_method(context: CodegenContext) -> str:
     if THRESHOLD in c.laws:
         with printer.block(f"if {c.mode.name} == 0 and fabs({printer.text(c.slip)}) < {printer.text(c.eps)}:"):
             inner = context.printer(printer.depth, printer.on_trial)
-            stuck = [analysis.derivative_while_stuck(rate, by) for rate in context.rate_outputs for by in directions]
-            context.emit_driver(inner, [analysis.load[c], *stuck])
+            stuck_targets = [
+                analysis.derivative_while_stuck(rate, by) for rate in context.rate_outputs for by in directions
+            ]
+            context.emit_driver(inner, [analysis.load[c], *stuck_targets])
             with inner.block(f"if fabs({inner.text(analysis.load[c])}) <= {inner.text(analysis.holding_limit[c])}:"):
-                inner.emit("return " + ", ".join(map(inner.text, stuck)))
+                inner.emit("return " + ", ".join(map(inner.text, stuck_targets)))
             printer.lines += inner.lines
             if depends_on(c.slide, analysis.time_varying) or depends_on(
                 analysis.holding_limit[c], analysis.time_varying
@@ -196,12 +198,12 @@ def clock_rates(analysis: ModelAnalysis) -> dict[Expression, Operand]:
     The rate of such a state depends on parameters, inputs and other clocks only.
     """
     rates: dict[Expression, Operand] = {**analysis.explicit_time_derivatives, **analysis.input_derivatives}
-    moving: set[Expression] = {*analysis.contacts, *analysis.modes, *analysis.states}
+    varying_symbols: set[Expression] = {*analysis.contacts, *analysis.modes, *analysis.states}
     for _ in analysis.states:
         for state, rate in analysis.rate.items():
-            if not depends_on(rate, moving):
+            if not depends_on(rate, varying_symbols):
                 rates[state] = rate
-                moving.discard(state)
+                varying_symbols.discard(state)
     return rates
 
 

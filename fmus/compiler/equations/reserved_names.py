@@ -28,7 +28,7 @@ CLASSES = ("Solver", "Model", "Fmi3Slave")
 BASES = (Model, Oscillator, DryFriction, CoupledFriction, PlanarFriction)  # of declared and generated classes
 ATTRIBUTES = {name for base in BASES for name in (*dir(base), *get_annotations(base)) if not name.startswith("_")}
 FMI_NAMES = ("time", "solver", "events")  # of variables that each FMU has
-RESERVED = {
+RESERVED_NAMES = {
     *("self", "t", *MATH, *ATTRIBUTES, *FMI_NAMES, *CLASSES),
     *(name for names in IMPORTS.values() for name in names),
 }
@@ -69,7 +69,7 @@ def check_name(name: str, e: Expression) -> None:
         raise ModelError(
             f"the name {name!r} is no identifier: use letters, digits and _, and no digit at the start", e.location
         )
-    if name in RESERVED or is_reserved_in_c(name) or iskeyword(name) or name.startswith("_"):
+    if name in RESERVED_NAMES or is_reserved_in_c(name) or iskeyword(name) or name.startswith("_"):
         raise ModelError(f"the name {name} is reserved by the solver or by C: choose another name", e.location)
     if not name.isascii():
         raise ModelError(f"the name {name} is not ASCII, as C requires: choose another name", e.location)

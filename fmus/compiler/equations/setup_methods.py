@@ -103,7 +103,7 @@ def emit_input_polynomials(context: CodegenContext, printer: ExpressionPrinter) 
         if not is_among(e, analysis.prescribed_inputs):
             printer.emit(f"{polynomial}.set_value(self.{e.name})")
             continue
-        inputs = [one for one in analysis.input_orders if depends_on(e.declared_rate, (one,))]
+        inputs = [variable for variable in analysis.input_orders if depends_on(e.declared_rate, (variable,))]
         for n in range(analysis.input_orders[e]):
             value = derivative_of_rate(analysis.names, e, inputs, n, printer)
             printer.emit(f"{polynomial}.continue_by({n + 1}, {value})")
@@ -117,11 +117,11 @@ def derivative_of_rate(
     if n == 0:
         return printer.text(e.declared_rate)
     derivatives: dict[Expression, Operand] = {}
-    for one in inputs:
+    for variable in inputs:
         symbol = Expression()
-        symbol.name = f"{one.name}_{n}"
-        printer.bound_names[symbol] = f"self.{one.name}_polynomial.derivatives[{n}]"
-        derivatives[one] = symbol
+        symbol.name = f"{variable.name}_{n}"
+        printer.bound_names[symbol] = f"self.{variable.name}_polynomial.derivatives[{n}]"
+        derivatives[variable] = symbol
     return printer.text(differentiate(e.declared_rate, derivatives, names))
 
 
@@ -160,12 +160,14 @@ def input_polynomial_methods(context: CodegenContext) -> list[str]:
         rates.emit(f"self.{rate.name} = self.{e.name}_polynomial.rate_at(t - self.t_base)")
     base.emit("super().rebase(t)")
     base.emit("self.t_base = t")
-    moving = context.printer()
-    moving.emit("return " + " or ".join(f"self.{e.name}_polynomial.order > 0" for e in context.analysis.input_rates))
+    input_motion = context.printer()
+    input_motion.emit(
+        "return " + " or ".join(f"self.{e.name}_polynomial.order > 0" for e in context.analysis.input_rates)
+    )
     return [
         method_source("rebase", ["t"], base.lines),
         method_source("set_input_rates", ["t"], rates.lines),
-        method_source("has_moving_inputs", (), moving.lines),
+        method_source("has_moving_inputs", (), input_motion.lines),
     ]
 
 

@@ -115,12 +115,12 @@ def check_holding_force(c: Contact, values: dict[Expression, float]) -> None:
 
 def shifted_values(analysis: ModelAnalysis, values: dict[Expression, float]) -> dict[Expression, float]:
     """Return the start values, moved by different amounts, so that forces equal by chance differ."""
-    shifted = dict(values)
+    result = dict(values)
     for n, (e, start) in enumerate(values.items(), start=1):
         value = start + 0.01 * n * (abs(start) + 1.0)
         if isinstance(e, (Parameter, Fixed, Input, State)) and e.accepts(value):
-            shifted[e] = value
-    return shifted
+            result[e] = value
+    return result
 
 
 def sliding_force(c: Contact, slip: float, values: dict[Expression, float]) -> float:
@@ -140,7 +140,8 @@ def check_state_ranges(analysis: ModelAnalysis, values: dict[Expression, float])
     for s in analysis.states:
         if not s.accepts(values[s]):
             raise ModelError(
-                f"{s.name} starts at {values[s]!r}{s.unit_suffix}, but its declaration says that it is {s.allowed}",
+                f"{s.name} starts at {values[s]!r}{s.unit_suffix}, but its declaration says that it is "
+                f"{s.allowed_range}",
                 s.location,
             )
 

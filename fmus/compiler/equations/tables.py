@@ -27,7 +27,7 @@ HOLD, CONTINUE, REFUSE = "hold", "continue", "refuse"
 INTERPOLATIONS, ENDS = (LINEAR, PCHIP), (HOLD, CONTINUE, REFUSE)
 CONSTANT, VALUE_KINDS = "constant", {"fixed": Fixed, "tunable": Parameter}
 # Where a piece has no end; states beyond this value are treated as divergence
-UNBOUNDED = 1e100
+UNBOUNDED_END = 1e100
 LARGEST, SMALLEST_STEP = 1e60, 1e-60  # of the numbers of a table and of x, so that its coefficients are finite
 OVERLAP, OVERLAP_OF_PIECE = 1e-9, 1e-4  # of pieces, as shares of the largest argument and of the shortest piece
 VARIABLE_KINDS = ("value", "slope")  # columns that depend on the values at the points
@@ -91,9 +91,11 @@ class Table(Expression):
             ("ends", ends, ENDS),
             ("values", values, (CONSTANT, *VALUE_KINDS)),
         )
-        for word, value, allowed in choices:
-            if value not in allowed:
-                raise ModelError(f"{word} of a table must be {' or '.join(map(repr, allowed))}, got {describe(value)}")
+        for word, value, allowed_values in choices:
+            if value not in allowed_values:
+                raise ModelError(
+                    f"{word} of a table must be {' or '.join(map(repr, allowed_values))}, got {describe(value)}"
+                )
         for word, unit in ("unit_x", unit_x), ("unit_y", unit_y):
             if not isinstance(unit, str) or not unit:
                 raise ModelError(f'a table needs its units: {word} is {describe(unit)}; a pure number has the unit "1"')
@@ -120,9 +122,10 @@ class Table(Expression):
 
     def declare_values(self, kind: type[SettableVariable], unit_x: str, unit_y: str, low: float) -> None:
         """Replace each value of y by a parameter."""
-        if named := [value for value in self.y if isinstance(value, Expression)]:
+        if parameters := [value for value in self.y if isinstance(value, Expression)]:
             raise ModelError(
-                f"{named[0]} in the table is a parameter already: leave out `values`, or write numbers in the table"
+                f"{parameters[0]} in the table is a parameter already: leave out `values`, or write numbers in the "
+                "table"
             )
         suffix = "" if unit_x == "1" else f" {unit_x}"
         self.y = tuple(kind(y, unit_y, f"value at {x:g}{suffix}", low=low) for x, y in zip(self.x, self.y, strict=True))
@@ -210,7 +213,7 @@ class Table(Expression):
     @cached_property
     def edges(self) -> tuple[float, ...]:
         """Lower ends of all pieces, then the upper end of the last one."""
-        return (-UNBOUNDED, *(self.x if self.has_end_pieces else self.x[1:-1]), UNBOUNDED)
+        return (-UNBOUNDED_END, *(self.x if self.has_end_pieces else self.x[1:-1]), UNBOUNDED_END)
 
     @cached_property
     def columns(self) -> dict[str, tuple[float, ...]]:
@@ -219,8 +222,8 @@ class Table(Expression):
 
     def columns_with(self, values: Sequence[float]) -> dict[str, tuple[float, ...]]:
         """Return the knot and the coefficients of all pieces, by kind, with values of the parameters."""
-        known = dict(zip(self.parameters, values, strict=True))
-        points = [known[value] if isinstance(value, SettableVariable) else value for value in self.y]
+        parameter_values = dict(zip(self.parameters, values, strict=True))
+        points = [parameter_values[value] if isinstance(value, SettableVariable) else value for value in self.y]
         steps = [b - a for a, b in pairwise(self.x)]
         secants = [(b - a) / h for (a, b), h in zip(pairwise(points), steps, strict=True)]
         rows: list[tuple[float, ...]] = []  # of each piece
@@ -379,12 +382,12 @@ def checked_points(x: object, y: object, source: str) -> tuple[tuple[float, ...]
             if word == "y" and isinstance(number, (Parameter, Fixed)):
                 continue
             if not is_number(number) or not math.isfinite(number):
-                got = f"got {describe(number)} as point {n}"
-                raise ModelError(f"{source}{word} of a table must be finite numbers, {got}")
+                description = f"got {describe(number)} as point {n}"
+                raise ModelError(f"{source}{word} of a table must be finite numbers, {description}")
             if abs(number) > LARGEST:
                 limits = f"between {-LARGEST:g} and {LARGEST:g}"
                 raise ModelError(f"{source}{word} of a table must be {limits}, got {describe(number)} as point {n}")
-        columns.append(tuple(one if isinstance(one, Expression) else float(one) for one in numbers))
+        columns.append(tuple(value if isinstance(value, Expression) else float(value) for value in numbers))
     first, second = columns
     if len(first) != len(second):
         raise ModelError(f"a table needs as many values of y as of x, got {len(second)} and {len(first)}")

@@ -8,7 +8,10 @@ from typing import Any
 from ...runtime import linear_solver
 from .layout import STATES, ModelLayout
 
-DECLARED, EXCHANGED = "_declared", "_exchanged"  # suffixes of names of solutions, by the order of the axes
+DECLARED_SUFFIX, EXCHANGED_SUFFIX = (
+    "_declared",
+    "_exchanged",
+)  # suffixes of names of solutions, by the order of the axes
 
 
 class Symbol:
@@ -18,7 +21,7 @@ class Symbol:
         self.node = node
 
     @classmethod
-    def named(cls, name: str) -> "Symbol":
+    def from_name(cls, name: str) -> "Symbol":
         """Return the symbol of a name."""
         return cls(ast.Name(name, ast.Load()))
 
@@ -87,7 +90,7 @@ class NamedEntries(linear_solver.Entries):
         targets: list[ast.expr] = [ast.Name(name, ast.Store()) for name in names]
         right = tuple_or_single(list(map(node_of, values)))
         self.statements.append(ast.Assign([tuple_or_single(targets)], right))
-        return list(map(Symbol.named, names))
+        return list(map(Symbol.from_name, names))
 
     def quotient_if(self, tests: list[Any], a: Any, b: Any) -> Symbol:
         """Return the conditional expression of a / b."""
@@ -114,7 +117,7 @@ class LoweredSystem:
         self.arguments = Symbol(first), Symbol(second)  # g and h, or the parts of the shift
         self.orders = [Elimination(name, self, list(range(len(spec.states))))]
         if spec.axes:
-            self.orders.append(Elimination(f"{name}{EXCHANGED}", self, spec.states_with_exchanged_axes))
+            self.orders.append(Elimination(f"{name}{EXCHANGED_SUFFIX}", self, spec.states_with_exchanged_axes))
 
     def factorize(self) -> list[ast.stmt]:
         """Return the statements that factorize the matrix."""
@@ -129,11 +132,11 @@ class LoweredSystem:
 
         `known_zeros` are names of components that are always zero.
         """
-        given = [i for i in range(len(self.spec.states)) if self.component(right[0], i) not in known_zeros]
-        r = {i: [Symbol.named(self.component(vector, i)) for vector in right] for i in given}
+        nonzero_states = [i for i in range(len(self.spec.states)) if self.component(right[0], i) not in known_zeros]
+        r = {i: [Symbol.from_name(self.component(vector, i)) for vector in right] for i in nonzero_states}
         if len(self.orders) == 1:
             return self.orders[0].solve(results, r)
-        vectors = [[f"{name}{suffix}" for name in results] for suffix in (DECLARED, EXCHANGED)]
+        vectors = [[f"{name}{suffix}" for name in results] for suffix in (DECLARED_SUFFIX, EXCHANGED_SUFFIX)]
         statements = [
             statement for order, names in zip(self.orders, vectors, strict=True) for statement in order.solve(names, r)
         ]
@@ -142,7 +145,7 @@ class LoweredSystem:
         for vector, first, second in zip(results, *vectors, strict=True):
             for i in places:
                 means[vector, i] = 0.5 * (
-                    Symbol.named(self.component(first, i)) + Symbol.named(self.component(second, i))
+                    Symbol.from_name(self.component(first, i)) + Symbol.from_name(self.component(second, i))
                 )
         return statements + means.statements
 
@@ -152,8 +155,8 @@ class Elimination:
 
     def __init__(self, name: str, system: LoweredSystem, states: Sequence[int]) -> None:
         self.system, spec = system, system.spec
-        self.computed = [i for i in states if i in spec.dynamic_states]
-        self.moved = {i: spec.rate_place(i) for i in states if i in spec.kinematic_states}
+        self.dynamic_states = [i for i in states if i in spec.dynamic_states]
+        self.kinematic_states = {i: spec.rate_place(i) for i in states if i in spec.kinematic_states}
 
         def entry(place: Any) -> str:
             return f"{name}_{place}" if isinstance(place, str) else spec.entry_name(name, *place)
@@ -166,22 +169,22 @@ class Elimination:
     def factorize(self) -> list[ast.stmt]:
         """Return the statements that factorize the matrix."""
         spec = self.system.spec
-        places = [(i, j) for i in self.computed for j in range(len(spec.states))]
+        places = [(i, j) for i in self.dynamic_states for j in range(len(spec.states))]
         name = ast.unparse(self.system.jacobian)
-        J = {at: Symbol.named(spec.entry_name(name, *at)) for at in places if at not in spec.zeros}
+        J = {at: Symbol.from_name(spec.entry_name(name, *at)) for at in places if at not in spec.zeros}
         factorize = linear_solver.factorize_complex if self.system.is_complex else linear_solver.factorize
         first, second = self.system.arguments
-        factorize(self.entries, first, second, J, self.computed, self.moved)
+        factorize(self.entries, first, second, J, self.dynamic_states, self.kinematic_states)
         return self.entries.statements
 
     def solve(self, results: Sequence[str], r: dict[int, list[Symbol]]) -> list[ast.stmt]:
         """Return the statements that solve for the parts of a right-hand side, by state."""
         k = NamedEntries(*(partial(self.system.component, vector) for vector in results))
         if self.system.is_complex:
-            parts = {i: linear_solver.Complex(*r[i]) for i in self.computed}
-            linear_solver.solve_complex(k, self.entries, parts, self.computed)
+            parts = {i: linear_solver.Complex(*r[i]) for i in self.dynamic_states}
+            linear_solver.solve_complex(k, self.entries, parts, self.dynamic_states)
         else:
             numbers = {i: parts[0] for i, parts in r.items()}
             g, h = self.system.arguments
-            linear_solver.solve(k, self.entries, g, h, numbers, self.computed, self.moved)
+            linear_solver.solve(k, self.entries, g, h, numbers, self.dynamic_states, self.kinematic_states)
         return k.statements

@@ -33,7 +33,7 @@ class FeatureSelection:
         return {"method": methods, "method_number": methods} | ({"friction": laws} if laws else {})
 
     @property
-    def excluded(self) -> frozenset[str]:
+    def excluded_labels(self) -> frozenset[str]:
         """Labels of excluded methods and laws."""
         return frozenset({*METHODS, *LAWS} - {*self.methods, *self.laws})
 
@@ -62,20 +62,20 @@ def select_features(
                 raise BuildError(
                     f"{option} {' and '.join(values)}: an FMU with Reals only has one: give {option} once."
                 )
-    for word, default, has, requested in (
+    for word, default, has, requested_labels in (
         ("method", analysis.methods, analysis.available_methods, methods),
         ("friction law", analysis.laws, analysis.laws, laws),
     ):
-        for label in requested:
+        for label in requested_labels:
             if label not in has:
                 raise BuildError(f"{source.name} has no {word} {label!r}; it has {', '.join(has) or 'none to choose'}.")
-        selections.append(tuple(label for label in has if label in (requested or default)))
-    selection, ruling = selections
-    if ruling and HYBRID not in ruling:  # the closed form requires the hybrid law
+        selections.append(tuple(label for label in has if label in (requested_labels or default)))
+    selection, selected_laws = selections
+    if selected_laws and HYBRID not in selected_laws:  # the closed form requires the hybrid law
         selection = tuple(label for label in selection if label != EXACT)
         if not selection:
             remedy = f"give --law {HYBRID} instead" if real_only else f"add --law {HYBRID}"
             raise BuildError(
                 f"{source.name}: the method {EXACT!r} needs the law {HYBRID!r}: {remedy}, or give another --method."
             )
-    return FeatureSelection(selection, ruling, real_only)
+    return FeatureSelection(selection, selected_laws, real_only)

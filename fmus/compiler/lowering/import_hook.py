@@ -90,10 +90,10 @@ def complete_tree(node: Any, line: int = 1, context: ast.expr_context = LOAD) ->
     """Return a copy of a tree with line numbers and contexts, for the compiler; nodes without a line have that of their
     statement."""
     line = getattr(node, "lineno", line)
-    stored = DELETE if isinstance(node, ast.Delete) else STORE
+    target_context = DELETE if isinstance(node, ast.Delete) else STORE
     fields = {}
     for name, value in ast.iter_fields(node):
-        inner = stored if name in TARGETS else context if isinstance(node, GROUPS) else LOAD
+        inner = target_context if name in TARGETS else context if isinstance(node, GROUPS) else LOAD
         if isinstance(value, list):
             value = [complete_tree(part, line, inner) if isinstance(part, ast.AST) else part for part in value]
         elif isinstance(value, ast.AST) and name != "ctx":

@@ -21,7 +21,8 @@ class ModelLayout:
     contacts    mode of each contact -> the state that is its slip, if any
     flags       attribute -> its value: has_dry_friction, is_linear, ...
     choices     attribute -> its possible values: method_number, friction, ...
-    excluded    labels of excluded methods and laws
+    excluded_labels
+                labels of excluded methods and laws
     methods     label -> class of the included methods that take steps
     zeros       entries of the Jacobian (index of a state, index of a state) that are always zero
     n_conditions
@@ -35,7 +36,7 @@ class ModelLayout:
     contacts: dict[str, str]
     flags: dict[str, bool] = field(default_factory=dict)
     choices: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    excluded: frozenset[str] = frozenset()
+    excluded_labels: frozenset[str] = frozenset()
     methods: dict[str, str] = field(default_factory=dict)
     zeros: frozenset[tuple[int, int]] = frozenset()
     n_conditions: int = 0

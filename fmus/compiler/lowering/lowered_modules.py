@@ -70,7 +70,7 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
         model_class.slips_of_contacts(analysis),
         flags,
         features.choices,
-        features.excluded,
+        features.excluded_labels,
         features.stepping_methods,
     )
     zeros = zero_jacobian_entries(source.generated_source, layout)
@@ -90,8 +90,8 @@ def speeds_in(slip: Operand, analysis: ModelAnalysis) -> list[str]:
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:
     """Return the entries of the Jacobian for which the source of a model returns the number 0.0 on every path."""
     (method,) = (node for node in parsed_nodes(text) if isinstance(node, ast.FunctionDef) and node.name == "jacobian")
-    returned = [node.value for node in all_nodes(method) if isinstance(node, ast.Return)]
-    rows = [value.elts for value in returned if isinstance(value, ast.Tuple)]
+    results = [node.value for node in all_nodes(method) if isinstance(node, ast.Return)]
+    rows = [value.elts for value in results if isinstance(value, ast.Tuple)]
     is_zero = [
         all(isinstance(value, ast.Constant) and value.value == 0.0 for value in column)
         for column in zip(*rows, strict=True)
@@ -105,14 +105,14 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> LoweredFiles:
     """Lower all runtime files and the file of a model."""
     spec = model_layout(source, features)
     file = f"{source.name}.py"
-    modules = {label: "linear_closed_form" if label == EXACT else label for label in spec.excluded}
-    excluded = {f"runtime/{module}.py" for module in modules.values()}
-    excluded |= set() if spec.planar else {f"runtime/{PLANAR_MODULE}.py"}
-    texts = {path: text for path, text in runtime_sources().items() if path not in excluded} | {
+    modules = {label: "linear_closed_form" if label == EXACT else label for label in spec.excluded_labels}
+    excluded_paths = {f"runtime/{module}.py" for module in modules.values()}
+    excluded_paths |= set() if spec.planar else {f"runtime/{PLANAR_MODULE}.py"}
+    texts = {path: text for path, text in runtime_sources().items() if path not in excluded_paths} | {
         file: source.generated_source
     }
-    declared = runtime_symbols()
-    files = {path: FileLowerer(spec, declared, path, text, path != file).tree for path, text in texts.items()}
+    symbols = runtime_symbols()
+    files = {path: FileLowerer(spec, symbols, path, text, path != file).tree for path, text in texts.items()}
     return remove_unused_code(files)
 
 
@@ -131,21 +131,21 @@ def lowered_texts(source: ModelFile, features: FeatureSelection) -> dict[str, st
 def remove_unused_code(files: Mapping[str, ast.Module]) -> dict[str, ast.Module]:
     """Remove unused functions and imports from the files of an FMU."""
     called_by: defaultdict[str, set[str]] = defaultdict(set)  # name of functions -> names in them
-    pending: list[str] = []  # names in all other code
+    pending_names: list[str] = []  # names in all other code
     for path, tree in files.items():
         for node in tree.body:
             for part in [*node.bases, *node.body] if isinstance(node, ast.ClassDef) else [node]:
                 if is_removable(part) and path not in FMI_LAYER:
                     called_by[part.name] |= names_in(part)
                 else:
-                    pending += names_in(part)
-    used: set[str] = set()
-    while pending:
-        name = pending.pop()
-        if name not in used:
-            used.add(name)
-            pending += called_by[name]
-    return {path: tree if path in FMI_LAYER else prune(tree, used) for path, tree in files.items()}
+                    pending_names += names_in(part)
+    used_names: set[str] = set()
+    while pending_names:
+        name = pending_names.pop()
+        if name not in used_names:
+            used_names.add(name)
+            pending_names += called_by[name]
+    return {path: tree if path in FMI_LAYER else prune(tree, used_names) for path, tree in files.items()}
 
 
 def is_removable(node: ast.AST) -> TypeGuard[ast.FunctionDef]:
@@ -163,11 +163,11 @@ def names_in(root: ast.AST) -> set[str]:
     return result
 
 
-def prune(tree: ast.Module, used: set[str]) -> ast.Module:
+def prune(tree: ast.Module, used_names: set[str]) -> ast.Module:
     """Remove functions whose names are not used, then imports that the file does not read."""
 
     def keep(statements: list[ast.stmt]) -> list[ast.stmt]:
-        return [node for node in statements if not (is_removable(node) and node.name not in used)]
+        return [node for node in statements if not (is_removable(node) and node.name not in used_names)]
 
     body = [
         replace_fields(node, body=keep(node.body) or [ast.copy_location(ast.Pass(), node)])

@@ -15,21 +15,21 @@ PLANAR_MODULE = "planar_contact"  # of models with contacts in a plane only
 class FileLowerer:
     """Lowers the statements of a file; `vectors` is whether it uses vectors."""
 
-    def __init__(self, spec: ModelLayout, declared: SourceSymbols, path: str, text: str, vectors: bool) -> None:
-        self.spec, self.declared, self.path, self.has_vectors = spec, declared, path, vectors
+    def __init__(self, spec: ModelLayout, symbols: SourceSymbols, path: str, text: str, vectors: bool) -> None:
+        self.spec, self.symbols, self.path, self.has_vectors = spec, symbols, path, vectors
         self.scalarizer = self.new_scalarizer()
         self.has_systems = False  # whether a function solves linear equations
         body = parsed_module(text).body
         imports = [node for node in body if isinstance(node, ast.ImportFrom) and is_build_time_import(node)]
         self.ranges = {alias.name for node in imports for alias in node.names} & {*LOOP_RANGES, METHOD_LOOP}
-        lowered = self.lower_block(body)
+        statements = self.lower_block(body)
         if self.has_systems:
-            lowered.insert(1, ast.ImportFrom("math", [ast.alias(name) for name in SOLVER_IMPORTS], 0))
-        self.tree = ast.Module(lowered, [])
+            statements.insert(1, ast.ImportFrom("math", [ast.alias(name) for name in SOLVER_IMPORTS], 0))
+        self.tree = ast.Module(statements, [])
 
     def new_scalarizer(self, index: dict[str, int] | None = None) -> Scalarizer:
         """Create the scalarizer of a function; `index` binds loop variables."""
-        return Scalarizer(self.spec, self.declared, self.path, self.has_vectors, index)
+        return Scalarizer(self.spec, self.symbols, self.path, self.has_vectors, index)
 
     def lower_block(self, statements: list[ast.stmt]) -> list[ast.stmt]:
         """Lower statements up to one that always leaves the function."""
@@ -152,7 +152,7 @@ class FileLowerer:
                 value=ast.Call(func=ast.Name(id="Enumeration"), args=[start, text, items]) as choice,
             ) if possible := self.spec.choices.get(name):
                 is_included = ast.unparse(start).removesuffix(".NUMBER") in self.spec.methods
-                if not is_included and self.declared.constants.get(getattr(start, "id", "")) not in possible:
+                if not is_included and self.symbols.constants.get(getattr(start, "id", "")) not in possible:
                     start = ast.Constant(possible[0])
                 if isinstance(items, ast.Tuple):
                     items = replace_fields(items, elts=[item for item in items.elts if not self.is_excluded(item)])
@@ -161,7 +161,7 @@ class FileLowerer:
 
     def is_excluded(self, node: ast.expr) -> bool:
         """Return whether this is an excluded item, or its name."""
-        return (item_label(node) or self.declared.constants.get(getattr(node, "id", ""))) in self.spec.excluded
+        return (item_label(node) or self.symbols.constants.get(getattr(node, "id", ""))) in self.spec.excluded_labels
 
 
 def leaves(statements: list[ast.stmt]) -> bool:

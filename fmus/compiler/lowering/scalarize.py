@@ -33,10 +33,10 @@ class Scalarizer(ConstantFolder):
     """Tracks the names of a function and rewrites its expressions component by component."""
 
     def __init__(
-        self, spec: ModelLayout, declared: SourceSymbols, path: str, vectors: bool, index: dict[str, int] | None = None
+        self, spec: ModelLayout, symbols: SourceSymbols, path: str, vectors: bool, index: dict[str, int] | None = None
     ) -> None:
-        super().__init__(spec, declared.constants)
-        self.declared, self.path, self.has_vectors = declared, path, vectors
+        super().__init__(spec, symbols.constants)
+        self.symbols, self.path, self.has_vectors = symbols, path, vectors
         self.vector_kinds: dict[str, str] = {}  # vector names -> what they run over
         self.function: ast.FunctionDef  # that is rewritten
         self.copies: dict[str, ast.expr] = {}  # components that are never stored -> the number that they equal
@@ -62,7 +62,7 @@ class Scalarizer(ConstantFolder):
             case ast.Name(id=name):
                 return self.vector_kinds.get(name)
             case ast.Attribute(attr=name):
-                return self.declared.vector_attributes.get(name)
+                return self.symbols.vector_attributes.get(name)
             case ast.Subscript(slice=ast.Slice(lower=None, upper=None)):
                 return CONDITIONS
             case ast.Call():
@@ -83,14 +83,14 @@ class Scalarizer(ConstantFolder):
         """Return whether a call works on vectors component by component."""
         if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
             return False
-        name, declared = node.func.id, self.declared
-        return name in declared.elementwise or name in declared.inlined or name in SELECTIONS
+        name, symbols = node.func.id, self.symbols
+        return name in symbols.elementwise or name in symbols.inlined_functions or name in SELECTIONS
 
     def result_kinds(self, call: ast.Call) -> list[str | None]:
         """Return the kinds of the results of a call."""
         if self.is_elementwise(call):
             return [next(filter(None, map(self.vector_kind, call.args)), None)]
-        return self.declared.result_kinds.get(function_name(call), [None])
+        return self.symbols.result_kinds.get(function_name(call), [None])
 
     def all_indices(self, kind: str) -> range:
         """Return the indices of all components."""
@@ -115,8 +115,8 @@ class Scalarizer(ConstantFolder):
                 return ast.UnaryOp(op, self.component(operand, place))
             case ast.Compare(left=left, ops=ops, comparators=[right]):
                 return ast.Compare(self.component(left, place), ops, [self.component(right, place)])
-            case ast.Call(func=ast.Name(id=name), args=args) if name in self.declared.inlined:
-                parameters, expression = self.declared.inlined[name]
+            case ast.Call(func=ast.Name(id=name), args=args) if name in self.symbols.inlined_functions:
+                parameters, expression = self.symbols.inlined_functions[name]
                 arguments = dict(zip(parameters, args, strict=True))
                 uses = Counter(part.id for part in all_nodes(expression) if isinstance(part, ast.Name))
                 if any(uses[name] > 1 and not isinstance(part, SIMPLE) for name, part in arguments.items()):
@@ -202,8 +202,8 @@ class Scalarizer(ConstantFolder):
         """Rewrite the elements of a row; *y expands to all components of y."""
         result: list[ast.expr] = []
         for part in parts:
-            starred = isinstance(part, ast.Starred) and self.vector_kind(part.value)
-            result += self.components(part.value) if isinstance(part, ast.Starred) and starred else [self.visit(part)]
+            is_vector = isinstance(part, ast.Starred) and self.vector_kind(part.value)
+            result += self.components(part.value) if isinstance(part, ast.Starred) and is_vector else [self.visit(part)]
         return result
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -213,7 +213,7 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id="tuple"), args=[ast.GeneratorExp(elt=item, generators=[each])]):
                 if isinstance(each.iter, ast.Name) and each.iter.id == METHOD_LOOP:
                     return ast.Tuple([self.visit_for_method(item, each.target, label) for label in self.spec.methods])
-            case ast.Call(func=ast.Name(id=name), args=args) if name in self.declared.inlined:
+            case ast.Call(func=ast.Name(id=name), args=args) if name in self.symbols.inlined_functions:
                 return self.inlined_test(name, args)
             case ast.Call(func=ast.Name(id="len"), args=[argument]) if kind := self.vector_kind(argument):
                 return ast.Constant(self.spec.size(kind))
@@ -253,9 +253,13 @@ class Scalarizer(ConstantFolder):
 
     def inlined_test(self, name: str, args: list[ast.expr]) -> ast.AST:
         """Return the expression of a function of scalars, with the constants of its file as numbers."""
-        parameters, expression = self.declared.inlined[name]
+        parameters, expression = self.symbols.inlined_functions[name]
         names = {node.id for node in all_nodes(expression) if isinstance(node, ast.Name)} - {*parameters}
-        numbers = {one: ast.Constant(value) for one in names if (value := self.declared.constants.get(one)) is not None}
+        numbers = {
+            constant: ast.Constant(value)
+            for constant in names
+            if (value := self.symbols.constants.get(constant)) is not None
+        }
         test = self.visit(Substitution(dict(zip(parameters, args, strict=True))).visit(expression))
         return Substitution(numbers).visit(test)
 
@@ -273,7 +277,7 @@ class Scalarizer(ConstantFolder):
             ):
                 place = ast.Attribute(self.visit(thing), ast.literal_eval(self.method_bindings[name]), ast.Store())
                 return [ast.Assign([place], self.visit(value))]
-            case ast.Return(value=ast.Call() as call) if function_name(call) in self.declared.rates:
+            case ast.Return(value=ast.Call() as call) if function_name(call) in self.symbols.rates:
                 raise self.error(call)  # a name is needed: see lower_rates
             case ast.Return(value=ast.Tuple(elts=parts)):
                 return [ast.Return(tuple_or_single([term for part in parts for term in self.components(part)]))]
@@ -283,10 +287,10 @@ class Scalarizer(ConstantFolder):
             case ast.Assign(
                 targets=[ast.Tuple(elts=[ast.Name(id=f_t), ast.Name(id=J)])],
                 value=ast.Call(func=ast.Attribute(attr=name)) as call,
-            ) if name in self.declared.jacobians:
+            ) if name in self.symbols.jacobians:
                 return self.lower_jacobian(f_t, J, call)
             case ast.Assign(targets=[target], value=ast.Call(func=ast.Attribute(attr=name)) as call) if (
-                name in self.declared.rates
+                name in self.symbols.rates
             ):
                 return self.lower_rates(target, call)
             case ast.Assign(
@@ -309,8 +313,10 @@ class Scalarizer(ConstantFolder):
                 vectors, others = list(map(ast.unparse, results)), list(map(ast.unparse, right))
                 statements = self.systems[s].solve(vectors, others, self.known_zeros)
                 if self.systems[s].is_complex:  # only these states have a solution
-                    moved = self.spec.kinematic_states
-                    self.known_zeros |= {self.spec.component_name(name, STATES, i) for name in vectors for i in moved}
+                    kinematic_states = self.spec.kinematic_states
+                    self.known_zeros |= {
+                        self.spec.component_name(name, STATES, i) for name in vectors for i in kinematic_states
+                    }
                 return statements
             case ast.Assign():
                 return self.lower_assignment(node)
@@ -376,16 +382,16 @@ class Scalarizer(ConstantFolder):
                 else:
                     pairs.append((self.component(target, i) if kind else self.visit(target), number))
         pairs = [(target, number) for target, number in pairs if not is_same_tree(target, number)]
-        changed: set[str] = set()
+        changed_names: set[str] = set()
         for target, number in pairs:
-            if changed and changed & names_used(number):
+            if changed_names and changed_names & names_used(number):
                 return [
                     ast.Assign(
                         [tuple_or_single([target for target, _ in pairs])],
                         tuple_or_single([number for _, number in pairs]),
                     )
                 ]
-            changed.add(dotted_name(target))
+            changed_names.add(dotted_name(target))
         return [ast.Assign([target], number) for target, number in pairs]
 
     def lower_unpacking(self, targets: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
@@ -406,8 +412,8 @@ class Scalarizer(ConstantFolder):
         is_new = isinstance(f, ast.Name) and f.id not in self.vector_kinds
         is_fixed = is_new and {*names_used(f), *names_used(y)} <= names_with_one_value(self.function)
         self.record_kinds([f], [STATES])
-        computed = [self.component(f, i) for i in self.spec.dynamic_states]
-        statements: list[ast.stmt] = [ast.Assign([tuple_or_single(computed)], self.visit(call))]
+        dynamic_rates = [self.component(f, i) for i in self.spec.dynamic_states]
+        statements: list[ast.stmt] = [ast.Assign([tuple_or_single(dynamic_rates)], self.visit(call))]
         for i in self.spec.kinematic_states:
             target, rate = self.component(f, i), self.component(y, self.spec.rate_place(i))
             if is_fixed:
@@ -421,12 +427,15 @@ class Scalarizer(ConstantFolder):
         self.vector_kinds[f_t] = STATES
         self.jacobians.add(J)
         dynamic = self.spec.dynamic_states
-        named = {i: self.spec.component_name(f_t, STATES, i) for i in self.all_indices(STATES)}
-        self.known_zeros |= {name for i, name in named.items() if i not in dynamic}
+        time_derivatives = {i: self.spec.component_name(f_t, STATES, i) for i in self.all_indices(STATES)}
+        self.known_zeros |= {name for i, name in time_derivatives.items() if i not in dynamic}
         names = []
         for i in dynamic:
             entries = [(i, j) for j in self.all_indices(STATES)]
-            names += [named[i], *("_" if at in self.spec.zeros else self.spec.entry_name(J, *at) for at in entries)]
+            names += [
+                time_derivatives[i],
+                *("_" if at in self.spec.zeros else self.spec.entry_name(J, *at) for at in entries),
+            ]
         return [ast.Assign([tuple_or_single([ast.Name(name) for name in names])], self.visit(call))]
 
     def lower_product(self, target: ast.Name, J: str, vector: ast.expr) -> list[ast.stmt]:
@@ -458,11 +467,11 @@ class Scalarizer(ConstantFolder):
 
 def names_with_one_value(function: ast.FunctionDef) -> set[str]:
     """Return the parameters that a function does not change, and the names that one statement of it sets."""
-    stored = [argument.arg for argument in function.args.args]
+    names = [argument.arg for argument in function.args.args]
     for part in all_nodes(function):
         for target in part.targets if isinstance(part, ast.Assign) else ():
-            stored += [name.id for name in all_nodes(target) if isinstance(name, ast.Name)]
-    return {name for name, count in Counter(stored).items() if count == 1}
+            names += [name.id for name in all_nodes(target) if isinstance(name, ast.Name)]
+    return {name for name, count in Counter(names).items() if count == 1}
 
 
 def function_name(call: ast.Call) -> str:

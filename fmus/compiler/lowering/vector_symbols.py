@@ -19,7 +19,7 @@ class SourceSymbols:
         self.vector_attributes: dict[str, str] = {}
         self.constants: dict[str, Any] = {}
         self.elementwise: set[str] = set()
-        self.inlined: dict[str, tuple[list[str], ast.expr]] = {}  # parameters and expression
+        self.inlined_functions: dict[str, tuple[list[str], ast.expr]] = {}  # parameters and expression
         self.result_kinds: dict[str, list[str | None]] = {}  # of functions that return vectors
         self.rates: set[str] = set()  # functions that return rates, without those that are states
         self.jacobians: set[str] = set()  # functions that return the derivatives of the rates
@@ -40,21 +40,21 @@ class SourceSymbols:
             case ast.ClassDef():
                 names = {getattr(part.targets[0], "id", "") for part in node.body if isinstance(part, ast.Assign)}
                 names |= {part.attr for part in all_nodes(node) if is_self_assignment(part)}
-                declared = {part.target.id: part for part in node.body if is_vector_declaration(part)}
-                for name, part in declared.items():
+                vectors = {part.target.id: part for part in node.body if is_vector_declaration(part)}
+                for name, part in vectors.items():
                     kind = annotated_kind(part) or ""
                     if self.vector_attributes.setdefault(name, kind) != kind:
                         raise BuildError(f"{node.name} declares {name} as another vector than another class.")
-                scalars |= dict.fromkeys(names - declared.keys(), node.name)
-                prefixes = tuple(f"{name}_" for name in declared)
-                if name := min((name for name in names - declared.keys() if name.startswith(prefixes)), default=""):
+                scalars |= dict.fromkeys(names - vectors.keys(), node.name)
+                prefixes = tuple(f"{name}_" for name in vectors)
+                if name := min((name for name in names - vectors.keys() if name.startswith(prefixes)), default=""):
                     raise BuildError(f"{node.name}.{name} is named like a component of a vector; take another name.")
             case ast.FunctionDef(name=name):
                 self.read_results(node)
                 if is_marked(node, "elementwise"):
                     self.elementwise.add(name)
                 if is_marked(node, "inlined") and isinstance(node.body[-1], ast.Return) and node.body[-1].value:
-                    self.inlined[name] = [argument.arg for argument in node.args.args], node.body[-1].value
+                    self.inlined_functions[name] = [argument.arg for argument in node.args.args], node.body[-1].value
 
     def read_results(self, node: ast.FunctionDef) -> None:
         """Collect the results of a function."""

@@ -87,22 +87,24 @@ def compile_binaries(name: str, files: Mapping[str, str], main: str, platform: s
     """Compile an FMU for a platform. Returns paths in the FMU, below binaries/, and contents."""
     suffix, libraries = PLATFORMS[platform].suffix, compile_libraries(name, files, main, platform)
     if fmi == "2":
-        combined = (
+        library = (
             make_universal_binary(list(libraries.values())) if len(libraries) > 1 else next(iter(libraries.values()))
         )
-        libraries = {platform: combined}
+        libraries = {platform: library}
     return {f"binaries/{folder}/{name}{suffix}": content for folder, content in libraries.items()}
 
 
 def compile_libraries(name: str, files: Mapping[str, str], main: str, platform: str) -> dict[str, bytes]:
     """Compile the source `main` for the processors of a platform. Returns libraries by folder of FMI 3.0."""
-    chosen, out = PLATFORMS[platform], f"{name}{PLATFORMS[platform].suffix}"
-    own_sources = {source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in chosen.sources}
+    configuration, out = PLATFORMS[platform], f"{name}{PLATFORMS[platform].suffix}"
+    own_sources = {
+        source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in configuration.sources
+    }
     is_large = sum(map(len, files.values())) > LARGE_SOURCE
-    options = (*SHARED_LIBRARY, *own_sources, *chosen.options, *(LARGE_SOURCE_OPTIONS if is_large else INLINING))
+    options = (*SHARED_LIBRARY, *own_sources, *configuration.options, *(LARGE_SOURCE_OPTIONS if is_large else INLINING))
     return {
         folder: compile_and_link({**files, **own_sources}, main, target, out, options)
-        for folder, target in chosen.targets.items()
+        for folder, target in configuration.targets.items()
     }
 
 

@@ -44,19 +44,19 @@ class Tangent:
     """A direction and the resulting changes: one float per variable with a tangent, and per constant of prepare."""
 
 
-def tangent_fields(declared: Variables) -> dict[str, str]:
+def tangent_fields(declarations: Variables) -> dict[str, str]:
     """Return the attribute of Tangent for each variable that has a derivative, or by which others have one."""
     return {
         name: name if name.isidentifier() else f"_{n}"
-        for n, (name, meaning) in enumerate(declared)
+        for n, (name, meaning) in enumerate(declarations)
         if (meaning.type == "Real" and meaning.causality in ("input", "output", "parameter"))
         or name.startswith(DERIVATIVE_NAME[:4])
     }
 
 
-def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, dict[str, FunctionType]]:
+def build_tangent_functions(model: Any, declarations: Variables) -> tuple[Tangent, dict[str, FunctionType]]:
     """Build the functions, by name, and an empty Tangent to pass to them."""
-    writer = TangentWriter(model, declared)
+    writer = TangentWriter(model, declarations)
     start, prepare, outputs = (
         function_tree(model.__dict__[name]).body for name in ("initial_state", "prepare", "compute_outputs")
     )
@@ -79,7 +79,7 @@ def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, d
         exec(compile(tree, module.__file__ or "?", "exec", optimize=0), own_names)
         functions[name] = own_names[name]
     tangent = Tangent()
-    for field in (*tangent_fields(declared).values(), *constants):
+    for field in (*tangent_fields(declarations).values(), *constants):
         setattr(tangent, field, 0.0)
     for field in writer.arrays:
         setattr(tangent, field, [0.0] * len(getattr(model(), field)))
@@ -124,13 +124,13 @@ def remove_unused(statements: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
 class TangentWriter:
     """Differentiates the statements of a function; each derivative comes before its statement."""
 
-    def __init__(self, model: Any, declared: Variables) -> None:
-        fields = tangent_fields(declared)
+    def __init__(self, model: Any, declarations: Variables) -> None:
+        fields = tangent_fields(declarations)
         self.states, self.contacts = list(model.states), list(model.contacts)
-        self.drivers = [name for name, meaning in declared if meaning.rate]
+        self.drivers = [name for name, meaning in declarations if meaning.rate]
         self.outputs: dict[str, str] = {}  # attribute -> tangent that a function calculates
         self.seeds: dict[str, str] = {}  # attribute -> tangent that is given
-        for name, meaning in declared:
+        for name, meaning in declarations:
             if meaning.causality == "output" and name in fields and meaning.role != "state":
                 self.outputs[name] = name
             elif meaning.causality in ("input", "parameter") and name in fields:
@@ -140,7 +140,7 @@ class TangentWriter:
             e.name: ast.parse(ExpressionPrinter({}, (), (), 0).text(value), mode="eval").body
             for e, value in ANALYSES[model].declared_derivatives().items()
         }
-        self.driver_rates = {fields[DERIVATIVE_NAME.format(name)]: d.rate for name, d in declared if d.rate}
+        self.driver_rates = {fields[DERIVATIVE_NAME.format(name)]: d.rate for name, d in declarations if d.rate}
         self.arrays: list[str] = []  # lists of constants, which have lists of tangents
         self.with_tangent: set[str] = set()  # local variables with a tangent
         self.used_names: set[str] = set()  # of the local variables
@@ -162,7 +162,7 @@ class TangentWriter:
         return parse_statements(begin) + self.differentiate(statements, self.outputs) + parse_statements(end)
 
     def differentiate(
-        self, statements: list[ast.stmt], results: dict[str, str], returned: Sequence[str] = ()
+        self, statements: list[ast.stmt], results: dict[str, str], result_tangents: Sequence[str] = ()
     ) -> list[ast.stmt]:
         """Return statements and their derivatives.
 
@@ -172,7 +172,7 @@ class TangentWriter:
             Body of a function, or a part of it.
         results
             Attributes whose tangents are calculated, and the names of these tangents.
-        returned
+        result_tangents
             Tangents to which the changes of the returned values are added.
         """
         lines: list[ast.stmt] = []
@@ -196,11 +196,11 @@ class TangentWriter:
                     self.arrays += [name] if name not in self.arrays else []
                     lines += self.assign_tangent(f"{TANGENT}.{name}[{ast.unparse(index)}]", value)
                 case ast.If():
-                    branches = (self.differentiate(part, results, returned) for part in (node.body, node.orelse))
+                    branches = (self.differentiate(part, results, result_tangents) for part in (node.body, node.orelse))
                     lines.append(ast.If(node.test, *branches))
-                case ast.Return(value=value) if returned and value is not None:
+                case ast.Return(value=value) if result_tangents and value is not None:
                     starts = value.elts if isinstance(value, ast.Tuple) else [value]
-                    for name, start in zip(returned, starts, strict=True):
+                    for name, start in zip(result_tangents, starts, strict=True):
                         lines += self.assign_tangent(f"{TANGENT}.{name}", start, f"{TANGENT}.{name}")
                     lines.append(ast.Return())
         return lines

@@ -153,8 +153,8 @@ DERIVATIVE_ATTRIBUTES = (
 def render_model_header(model: Any, fmi: str) -> str:
     """Return the text of model.h for a version of FMI."""
     instance, run = model_exchange_run(model)
-    declared = all_variables(model)
-    tangent, tangent_functions = build_tangent_functions(model, declared)
+    declarations = all_variables(model)
+    tangent, tangent_functions = build_tangent_functions(model, declarations)
     call_graph = CallGraph(instance, run, tangent)
     for function_name, propagate in tangent_functions.items():
         call_graph.add_model_entry_point(
@@ -163,12 +163,12 @@ def render_model_header(model: Any, fmi: str) -> str:
     for function, arg_types in entry_point_types(model, StructPointer(type(run)), call_graph.layout.model, fmi).items():
         call_graph.add_entry_point(function, arg_types)
     layout = call_graph.layout
-    names, interpolated = [name for name, _ in declared], interpolated_inputs(model)
+    names, interpolated_names = [name for name, _ in declarations], interpolated_inputs(model)
     roots = [("run", type(run)), ("model", type(instance))]
     members = [(path, ctype) for prefix, cls in roots for path, ctype in layout.iter_scalars(cls, f"{prefix}.")]
     members = [(path, ctype) for path, ctype in members if ctype in (INT, BOOL)]
     statuses = {status: message for status, message in RUN_MESSAGES.items() if status not in PYTHON_ONLY_STATUSES}
-    discrete = [i for i, (_, meaning) in enumerate(declared) if meaning.variability == "discrete"]
+    discrete = [i for i, (_, meaning) in enumerate(declarations) if meaning.variability == "discrete"]
     rule_fields = {
         name: f"{'append_real' if ctype is FLOAT else 'append_integer'}(text, model->{name})"
         for name, ctype in layout.fields[type(instance)].items()
@@ -182,12 +182,12 @@ def render_model_header(model: Any, fmi: str) -> str:
         numerics=call_graph.text(),
         run=layout.initializer(run, "        "),
         image=layout.initializer(instance, "        "),
-        items="".join(_items_array(name, meaning) for name, meaning in declared if meaning.items),
+        items="".join(_items_array(name, meaning) for name, meaning in declarations if meaning.items),
         count=len(names),
         declared=len(declared_variables(model)),
         ahead=names.index("solver.t_next"),
-        states=len(derivative_indices(declared)),
-        indicators=len(event_indicator_indices(declared)),
+        states=len(derivative_indices(declarations)),
+        indicators=len(event_indicator_indices(declarations)),
         discrete=", ".join(map(str, discrete)),
         count_of_discrete=len(discrete),
         count_of_members=len(members),
@@ -197,10 +197,10 @@ def render_model_header(model: Any, fmi: str) -> str:
                 name,
                 meaning,
                 attribute_path(model, name),
-                tangent_fields(declared),
-                derivative_attributes(instance, name, interpolated),
+                tangent_fields(declarations),
+                derivative_attributes(instance, name, interpolated_names),
             )
-            for name, meaning in declared
+            for name, meaning in declarations
         ),
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(instance.rules, rule_fields),
         inconsistent_input="model->inconsistent_input" if model.counts_jumps else "0",
@@ -212,11 +212,11 @@ def render_model_header(model: Any, fmi: str) -> str:
     )
 
 
-def derivative_attributes(instance: VariableOwner, name: str, interpolated: Collection[str]) -> tuple[str, ...]:
+def derivative_attributes(instance: VariableOwner, name: str, interpolated_names: Collection[str]) -> tuple[str, ...]:
     """Return those of DERIVATIVE_ATTRIBUTES that a variable has: the last one if the importer may set derivatives."""
     if not hasattr(instance, f"{name}_polynomial"):
         return ()
-    return DERIVATIVE_ATTRIBUTES if name in interpolated else DERIVATIVE_ATTRIBUTES[:-1]
+    return DERIVATIVE_ATTRIBUTES if name in interpolated_names else DERIVATIVE_ATTRIBUTES[:-1]
 
 
 def rate_warnings(prescribed_inputs: Sequence[tuple[str, str]]) -> dict[int, str]:
@@ -260,7 +260,7 @@ def _variable_row(
     derivatives: Collection[str],
 ) -> str:
     """Return the table row of a variable; `derivatives` are those of DERIVATIVE_ATTRIBUTES that it has."""
-    texts = (exported_name(name, meaning), meaning.text, meaning.unit_suffix, meaning.allowed)
+    texts = (exported_name(name, meaning), meaning.text, meaning.unit_suffix, meaning.allowed_range)
     flags = (
         meaning.type == "Real",
         meaning.is_integer,
@@ -320,7 +320,7 @@ ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before 
     "early_return": ("begin_step", "next_internal_step", "end_step", "complete_event"),  # for FMI 3.0
 }
 # Parameters of type bool; run and model are structs, a status is an int, all others are floats.
-BOOL_PARAMETERS = ("calculated", "fixed", "allowed", "ahead", "defer_events")
+BOOL_PARAMETERS = ("is_calculated", "is_fixed", "is_allowed", "ahead", "defer_events")
 
 
 def entry_point_types(

@@ -87,10 +87,10 @@ def build(
     source = replace(find_model(model), has_input_derivatives=fmi == "2")  # FMI 3.0 cannot set derivatives of inputs
     name, cls = source.name, lowered_model(source, select_features(source, methods, laws, real_only))
     files, description = generate_c_sources(cls, name, date, fmi)
-    declared = declared_variables(cls)
-    entries = extra_files(cls, source.path, declared, source.analysis, ICON_PATHS[fmi], USAGE_NOTE)
+    declarations = declared_variables(cls)
+    entries = extra_files(cls, source.path, declarations, source.analysis, ICON_PATHS[fmi], USAGE_NOTE)
     if fmi == "3":
-        entries |= terminals(declared, bool(source.analysis.planar_contacts))
+        entries |= terminals(declarations, bool(source.analysis.planar_contacts))
     entries |= {"modelDescription.xml": description, LICENSE: license_files()[LICENSE]}
     entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
     entries["sources/buildDescription.xml"] = render_build_description(name, fmi)
