@@ -170,8 +170,8 @@ def _variable_table(variables: Variables) -> str:
         text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
         cells = (f"<code>{escape(exported_name(variable, meaning))}</code>", f"{value} {escape(unit)}".strip(), text)
         rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
-    set_ = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in variables]
-    value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
+    is_settable = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in variables]
+    value = "default" if all(is_settable) else "default, unit" if any(is_settable) else "unit"
     head = f"<thead><tr><th>name</th><th>{value}</th><th>description</th></tr></thead>"
     return f"<table>{head}{''.join(rows)}</table>"
 

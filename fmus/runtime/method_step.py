@@ -100,8 +100,8 @@ def accept_proposal(model, step):
     if h < h_min:
         h = h_min
     remaining_time = step.t_end - t - roundoff.t0
-    last = 1.1 * h >= remaining_time
-    h = remaining_time if last else h
+    is_last = 1.1 * h >= remaining_time
+    h = remaining_time if is_last else h
     scale = error_size(y)
     method.raise_scale_floor(model, scale)
     scale = elementwise_max(method.error_scale_floor, scale)
@@ -142,14 +142,14 @@ def accept_proposal(model, step):
         if has_narrow_features(model, step) and share < 1.0:
             h_new = h * share
         h = h_min if h_new < h_min else h_new
-        last = False
+        is_last = False
     if attempts == 0:
         grow = method.safety * error**-method.power if error > 1e-9 else method.grow
         step.h_next = h * (grow if grow < method.grow else method.grow)
     else:
         step.h_next = h * method.shrink_after_rejection
     step.h_full = h
-    if last:
+    if is_last:
         step.t1, roundoff.t1 = step.t_end, 0.0
     else:
         step.t1 = roundoff.end_time(t, h)

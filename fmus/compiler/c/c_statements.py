@@ -309,11 +309,11 @@ class FunctionTranslator(ExpressionTranslator):
 def remove_unused_assignments(lines: list[str], local_variables: set[str]) -> list[str]:
     """Remove assignments to local variables that no line reads; calls stay, because they may fault or have effects."""
     while True:
-        read = names_in_lines([match[3] if (match := ASSIGNMENT.fullmatch(line)) else line for line in lines])
+        names_read = names_in_lines([match[3] if (match := ASSIGNMENT.fullmatch(line)) else line for line in lines])
         result = []
         for line in lines:
             match = ASSIGNMENT.fullmatch(line)
-            if match is None or match[2] in read or (not match[1] and match[2] not in local_variables):
+            if match is None or match[2] in names_read or (not match[1] and match[2] not in local_variables):
                 result.append(line)
             elif CALL.search(match[3]):
                 result.append(f"{line[: len(line) - len(line.lstrip())]}(void)({match[3]});")

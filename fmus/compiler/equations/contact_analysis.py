@@ -298,10 +298,10 @@ class ContactAnalysis(ModelRoles):
         varying_symbols = (*self.time_varying, *self.input_symbols)
         result = []
         for c in self.contacts:
-            at = "at t = {violation_time!r} s"
+            time = "at t = {violation_time!r} s"
             if c.lifts_off is None and depends_on(c.slide, varying_symbols) and not is_nonnegative(c.slide):
                 sentence = (
-                    f"{c.name}: the sliding force becomes negative {at} ({{violation_value!r}} {c.unit}); if the "
+                    f"{c.name}: the sliding force becomes negative {time} ({{violation_value!r}} {c.unit}); if the "
                     "contact lifts off there, declare lifts_off=True"
                 )
                 result.append(Condition(c.slide, (c.slide,), sentence=sentence))
@@ -310,7 +310,7 @@ class ContactAnalysis(ModelRoles):
                 continue
             surplus = build_term("-", build_term("*", 1.0 + HOLD_TOLERANCE, c.hold), at_rest)
             sentence = (
-                f"{c.name}: the sliding force exceeds the holding force {at} (hold - slide = {{violation_value!r}} "
+                f"{c.name}: the sliding force exceeds the holding force {time} (hold - slide = {{violation_value!r}} "
                 f"{c.unit}): lower slide or raise hold"
             )
             margin = Term("choose", Term("==", c.mode, 0), surplus, 1.0)

@@ -140,13 +140,13 @@ def _check_printable(name: str, location: tuple[str, int], *words: str) -> None:
 
 def check_use(analysis: ModelRoles) -> None:
     """Raise ModelError for a parameter, choice or input that no equation and no rule reads."""
-    read: dict[int, Operand] = {}
+    used_operands: dict[int, Operand] = {}
     for part in (
         *(rule.broken for rule in analysis.rules),
         *(expression for e in analysis.variables for expression in analysis.declared_expressions(e)),
     ):
-        subexpressions(part, read)
-    read |= {id(table): table for table in analysis.tables if table.is_called}
+        subexpressions(part, used_operands)
+    used_operands |= {id(table): table for table in analysis.tables if table.is_called}
     for e in (*analysis.parameters, *analysis.choices, *analysis.inputs, *analysis.tables):
-        if id(e) not in read:
+        if id(e) not in used_operands:
             raise ModelError(f"no equation uses {e.name}: use it, or remove its declaration", e.location)

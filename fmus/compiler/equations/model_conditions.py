@@ -236,10 +236,10 @@ def locate_kinks(model: type[Model]) -> None:
     slots += [(c, name) for c in contacts for name in ("slide", "hold")]
     expressions = [getattr(e, name) for e, name in slots]
     leaves = [e for e in operands_first(*expressions) if isinstance(e, Variable) and not isinstance(e, Output)]
-    changing, fast = dependents(expressions, leaves), dependents(expressions, speeds)
+    changing_ids, fast_ids = dependents(expressions, leaves), dependents(expressions, speeds)
 
     def comparison(kink: Term, u: Operand) -> Term | None:
-        if id(kink) not in changing or id(kink) in fast:
+        if id(kink) not in changing_ids or id(kink) in fast_ids:
             return None
         condition = Term(">", u, 0.0)
         condition.location = kink.location

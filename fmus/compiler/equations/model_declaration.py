@@ -421,15 +421,15 @@ class _ClassBody(dict[str, Any]):
 
     def __init__(self) -> None:
         super().__init__()
-        self.unread: dict[str, tuple[str, int]] = {}  # name -> file and line
+        self.unread_names: dict[str, tuple[str, int]] = {}  # name -> file and line
 
     def __getitem__(self, name: str) -> Any:
         value = super().__getitem__(name)
-        self.unread.pop(name, None)
+        self.unread_names.pop(name, None)
         return value
 
     def __setitem__(self, name: str, value: Any) -> None:
-        if isinstance(self.get(name), Expression) or (name in SETTINGS and name in self.unread):
+        if isinstance(self.get(name), Expression) or (name in SETTINGS and name in self.unread_names):
             if element := getattr(self[name], "element", "") or getattr(value, "element", ""):
                 raise ModelError(f"the name {name} is reserved for {element}: choose another name")
             raise ModelError(
@@ -437,17 +437,17 @@ class _ClassBody(dict[str, Any]):
             )
         if isinstance(value, Expression):
             value.name = value.name or name
-            self.unread.pop(name, None)
+            self.unread_names.pop(name, None)
             for suffix, element, variable in value.own_variables:
                 variable.element = name + element
                 self[name + suffix] = variable
         else:
-            self.unread[name] = author_location()
+            self.unread_names[name] = author_location()
         super().__setitem__(name, value)
 
     def check_unread(self) -> None:
         """Raise ModelError for a value that neither the body reads nor the build, such as a misspelt setting."""
-        for name, location in self.unread.items():
+        for name, location in self.unread_names.items():
             value = self.get(name)
             is_function = isinstance(value, FUNCTION_TYPES) and not name.startswith("__annotate")
             is_loop_variable = getline(*location).lstrip().startswith("for ")

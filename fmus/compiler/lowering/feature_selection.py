@@ -62,14 +62,16 @@ def select_features(
                 raise BuildError(
                     f"{option} {' and '.join(values)}: an FMU with Reals only has one: give {option} once."
                 )
-    for word, default, has, requested_labels in (
+    for word, default, available_labels, requested_labels in (
         ("method", analysis.methods, analysis.available_methods, methods),
         ("friction law", analysis.laws, analysis.laws, laws),
     ):
         for label in requested_labels:
-            if label not in has:
-                raise BuildError(f"{source.name} has no {word} {label!r}; it has {', '.join(has) or 'none to choose'}.")
-        selections.append(tuple(label for label in has if label in (requested_labels or default)))
+            if label not in available_labels:
+                raise BuildError(
+                    f"{source.name} has no {word} {label!r}; it has {', '.join(available_labels) or 'none to choose'}."
+                )
+        selections.append(tuple(label for label in available_labels if label in (requested_labels or default)))
     selection, selected_laws = selections
     if selected_laws and HYBRID not in selected_laws:  # the closed form requires the hybrid law
         selection = tuple(label for label in selection if label != EXACT)

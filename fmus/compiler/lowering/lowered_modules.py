@@ -175,11 +175,11 @@ def prune(tree: ast.Module, used_names: set[str]) -> ast.Module:
         else node
         for node in keep(tree.body)
     ]
-    read = {name for node in body for name in names_in(node)}
+    names_read = {name for node in body for name in names_in(node)}
     result: list[ast.stmt] = []
     for node in body:
         if isinstance(node, ast.ImportFrom) and node.module != "__future__":
-            aliases = [alias for alias in node.names if (alias.asname or alias.name) in read]
+            aliases = [alias for alias in node.names if (alias.asname or alias.name) in names_read]
             result += [replace_fields(node, names=aliases)] if aliases else []
         else:
             result.append(node)

@@ -60,8 +60,8 @@ def build_tangent_functions(model: Any, declarations: Variables) -> tuple[Tangen
     start, prepare, outputs = (
         function_tree(model.__dict__[name]).body for name in ("initial_state", "prepare", "compute_outputs")
     )
-    read = list_attributes(outputs, ast.Load)
-    constants = [name for name in list_attributes(prepare, ast.Store) if name in read]
+    attributes_read = list_attributes(outputs, ast.Load)
+    constants = [name for name in list_attributes(prepare, ast.Store) if name in attributes_read]
     point = {"t": "t"} | {name: component_name("y", name) for name in model.states}
     point |= {name: component_name("modes", name) for name in model.contacts}
     begin = parse_statements(f"{name} = solver.{number}" for name, number in point.items())
@@ -101,22 +101,24 @@ def list_attributes(statements: list[ast.stmt], use: type[ast.expr_context]) -> 
     return list(dict.fromkeys(node.attr for node in nodes if isinstance(node.ctx, use)))
 
 
-def remove_unused(statements: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
+def remove_unused(statements: list[ast.stmt], names_read: set[str]) -> list[ast.stmt]:
     """Return statements without assignments to local variables that nothing reads, and without empty conditions.
 
-    `read` has the names that later statements read, and receives those of the result.
+    `names_read` has the names that later statements read, and receives those of the result.
     """
     result: list[ast.stmt] = []
     for node in reversed(statements):
         match node:
-            case ast.Assign(targets=[ast.Name(id=name)]) if name not in read:
+            case ast.Assign(targets=[ast.Name(id=name)]) if name not in names_read:
                 continue
             case ast.If():
-                body, orelse = (remove_unused(part, read) for part in (node.body, node.orelse))
+                body, orelse = (remove_unused(part, names_read) for part in (node.body, node.orelse))
                 if not body and not orelse:
                     continue
                 node = ast.If(node.test, body or [ast.Pass()], orelse)
-        read |= {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load)}
+        names_read |= {
+            part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load)
+        }
         result.insert(0, node)
     return result
 
