@@ -207,7 +207,7 @@ def test_the_error_of_the_inputs_is_added_to_the_variance():
     random = np.random.default_rng(1)
     jacobian, e, error = random.normal(size=(400, 2)), random.normal(size=400), random.normal(size=400)
     problem = SimpleNamespace(
-        all=(),
+        all_samples=(),
         residuals=lambda z, selection: e,
         choose_steps=lambda z, e: jacobian,
         records=[SimpleNamespace(y=e[:, None], step=np.zeros(1), noise=np.ones(1), scatter=np.ones(1))],

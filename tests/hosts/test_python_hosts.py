@@ -108,8 +108,8 @@ def test_the_newest_python_translates_a_model_without_warnings():
     if python is None:
         pytest.skip(f"there is no Python {PYTHONS[-1]} here")
     command = [python, "-I", "-W", "error", "-c", TRANSLATION, ROOT]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert (done.returncode, done.stderr) == (0, "")
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ class FitProblem:
         Observed variables, one for each column of the records.
     unknowns : sequence of Unknown
         Numbers to fit.
-    fixed : mapping
+    fixed_values : mapping
         Values of parameters that are not fitted.
     robust : bool
         Whether large residuals count linearly (Huber) instead of by their squares.
