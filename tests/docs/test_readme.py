@@ -37,8 +37,8 @@ def test_the_measured_pendulum_gives_the_quoted_output(tmp_path):
         pytest.skip(measured_records.MISSING)
     measured_records.write_original(record, tmp_path)
     blocks = scripts.find_blocks(DECAY_PAGE.read_text(encoding="utf-8"))
-    (place,) = [i for i, block in enumerate(blocks) if measured_records.ORIGINAL in block.text]
-    command, output = blocks[place : place + 2]
+    (index,) = [i for i, block in enumerate(blocks) if measured_records.ORIGINAL in block.text]
+    command, output = blocks[index : index + 2]
     assert command.text.strip() == f"friction-fmus {measured_records.COMMAND}"
     result = run_process(tmp_path, *measured_records.COMMAND.split())
     assert result.returncode == 0, result.stderr

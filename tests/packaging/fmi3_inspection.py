@@ -14,7 +14,7 @@ from shutil import rmtree
 from fmpy import extract, read_model_description
 from fmpy.fmi3 import FMU3Model
 
-NUDGE = 1e-3
+STEP = 1e-3
 
 
 @contextmanager
@@ -30,13 +30,13 @@ def instance(path):
 
 
 def read(fmu, variable):
-    get = fmu.getFloat64 if variable.type == "Float64" else fmu.getInt64
-    return get([variable.valueReference])[0]
+    get_values = fmu.getFloat64 if variable.type == "Float64" else fmu.getInt64
+    return get_values([variable.valueReference])[0]
 
 
 def write(fmu, variable, value):
-    put = fmu.setFloat64 if variable.type == "Float64" else fmu.setInt64
-    put([variable.valueReference], [value])
+    set_values = fmu.setFloat64 if variable.type == "Float64" else fmu.setInt64
+    set_values([variable.valueReference], [value])
 
 
 def variables(path):
@@ -65,8 +65,8 @@ def factors(path, parameters):
         by_name = {variable.name: variable for variable in description.modelVariables}
         smooth = [v for v in description.modelVariables if v.variability == "continuous" and v.initial == "calculated"]
         states = [rate.variable.derivative for rate in description.derivatives]
-        (push,) = [v for v in description.modelVariables if v.causality == "input"]
-        knowns = [*states, push]
+        (force_input,) = [v for v in description.modelVariables if v.causality == "input"]
+        knowns = [*states, force_input]
         names = [name for name in ("friction", "pin_load") if name in by_name]
         choices = product(*([int(item.value) for item in by_name[name].declaredType.items] for name in names))
         chance = random.Random(5)
@@ -78,24 +78,24 @@ def factors(path, parameters):
                 write(fmu, by_name[name], value)
             fmu.enterInitializationMode()
             fmu.exitInitializationMode()
-            settle(fmu)
+            handle_event(fmu)
             for i in range(12):
                 point = [chance.uniform(-0.3, 0.3), [0.0, 1e-8, 0.2, -0.2][i % 4], chance.uniform(-0.3, 0.3)]
                 force = chance.uniform(-0.1, 0.1)
-                put(fmu, push, [*point[: len(states)], force])
+                set_point(fmu, force_input, [*point[: len(states)], force])
                 fmu.enterEventMode()
-                settle(fmu)  # sets the mode, which the small changes keep
+                handle_event(fmu)  # sets the mode, which the small changes keep
                 point = (c_double * len(states))()
                 fmu.getContinuousStates(point, len(states))
                 point = [*point, force]
-                values_at_point = answers(fmu, smooth, push, point)
+                values_at_point = read_unknowns(fmu, smooth, force_input, point)
                 for index, known in enumerate(knowns):
-                    shifted_point = [value + NUDGE * (number == index) for number, value in enumerate(point)]
-                    shifted_values = answers(fmu, smooth, push, shifted_point)
+                    shifted_point = [value + STEP * (number == index) for number, value in enumerate(point)]
+                    shifted_values = read_unknowns(fmu, smooth, force_input, shifted_point)
                     for unknown, a, b in zip(smooth, values_at_point, shifted_values, strict=True):
                         if a != b:
                             row = responses.setdefault(unknown.valueReference, {})
-                            row.setdefault(known.valueReference, []).append((b - a) / NUDGE)
+                            row.setdefault(known.valueReference, []).append((b - a) / STEP)
     return responses
 
 
@@ -116,23 +116,23 @@ def nominals(path, variable, value):
     return events
 
 
-def settle(fmu):
-    """Handle an event."""
+def handle_event(fmu):
+    """Handle an event and continue."""
     fmu.updateDiscreteStates()
     fmu.enterContinuousTimeMode()
 
 
-def put(fmu, push, point):
+def set_point(fmu, force_input, point):
     """Set states and input to a point."""
     *states, force = point
-    write(fmu, push, force)
+    write(fmu, force_input, force)
     fmu.setTime(1.0)
     fmu.setContinuousStates((c_double * len(states))(*states), len(states))
 
 
-def answers(fmu, smooth, push, point):
+def read_unknowns(fmu, smooth, force_input, point):
     """Read the unknowns at a point."""
-    put(fmu, push, point)
+    set_point(fmu, force_input, point)
     return [read(fmu, variable) for variable in smooth]
 
 

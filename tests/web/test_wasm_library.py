@@ -20,22 +20,22 @@ NUMBERS = [0.1, 5e-324, 1.7976931348623157e308, 9007199254740993.0, 1e16, 123456
 def library(browser):
     """Return an evaluator of library functions, with a memory of their own and helpers to write and read strings."""
     text = (PAGE_FOLDER / "script" / "libc.js").read_text(encoding="utf-8").replace("export ", "")
-    setting = """
+    helpers = """
         const memory = new WebAssembly.Memory({ initial: 1 }), output = [];
         const c = libc(() => memory, (bytes) => output.push(...bytes));
         const view = () => new DataView(memory.buffer);
-        const put = (text) => {
-          const place = c.malloc(text.length + 1);
-          [...text, "\\0"].forEach((character, i) => view().setUint8(place + i, character.charCodeAt(0)));
-          return place;
+        const store = (text) => {
+          const address = c.malloc(text.length + 1);
+          [...text, "\\0"].forEach((character, i) => view().setUint8(address + i, character.charCodeAt(0)));
+          return address;
         };
-        const get = (place) => {
+        const load = (address) => {
           let text = "";
-          for (let i = place; view().getUint8(i); i++) text += String.fromCharCode(view().getUint8(i));
+          for (let i = address; view().getUint8(i); i++) text += String.fromCharCode(view().getUint8(i));
           return text;
         };
     """
-    return lambda expression: browser.run(f"(() => {{ {text} {setting} return {expression}; }})()")
+    return lambda expression: browser.run(f"(() => {{ {text} {helpers} return {expression}; }})()")
 
 
 def value(function, *arguments):
@@ -81,35 +81,42 @@ def js(number):
 def test_strings_and_numbers_are_formatted_as_in_c(library, format, types, values):
     size = {"l": 8, "e": 8}
     method = {"l": "setBigInt64", "e": "setFloat64"}
-    actual, steps = 0, []
+    offset, steps = 0, []
     for kind, item in zip(types, values, strict=True):
-        actual = -(-actual // size.get(kind, 4)) * size.get(kind, 4)
-        settings = f"put({json.dumps(item)})" if kind == "s" else f"{item!r}n" if kind == "l" else repr(item)
-        steps.append(f"view().{method.get(kind, 'setInt32')}(values + {actual}, {settings}, true)")
-        actual += size.get(kind, 4)
-    write = f"c.snprintf(place, room, put({json.dumps(format)}), values)"
-    folder = "place = c.malloc(100), values = c.malloc(64)"
+        offset = -(-offset // size.get(kind, 4)) * size.get(kind, 4)
+        argument = f"store({json.dumps(item)})" if kind == "s" else f"{item!r}n" if kind == "l" else repr(item)
+        steps.append(f"view().{method.get(kind, 'setInt32')}(values + {offset}, {argument}, true)")
+        offset += size.get(kind, 4)
+    write = f"c.snprintf(address, capacity, store({json.dumps(format)}), values)"
+    memory = "address = c.malloc(100), values = c.malloc(64)"
     expected = format.replace("%lld", "%d") % values
-    for room in (100, 3):
-        result = library(f"(({folder}, room = {room}) => [{', '.join(steps)}, {write}, get(place)].slice(-2))()")
-        assert result == [len(expected), expected[: room - 1]]
+    for capacity in (100, 3):
+        result = library(
+            f"(({memory}, capacity = {capacity}) => [{', '.join(steps)}, {write}, load(address)].slice(-2))()"
+        )
+        assert result == [len(expected), expected[: capacity - 1]]
 
 
 def test_memory_is_allocated_once_and_grows_until_exhausted(library):
     sizes = (1, 100, 70_000, 2**32 - 1, 16)
-    *places, failed_address, last_address = library(f"{list(sizes)}.map((size) => c.malloc(size))")
+    *addresses, failed_address, last_address = library(f"{list(sizes)}.map((size) => c.malloc(size))")
     assert failed_address == 0
-    for address, size, next_address in zip(places, sizes, [*places[1:], last_address], strict=False):
+    for address, size, next_address in zip(addresses, sizes, [*addresses[1:], last_address], strict=False):
         assert (bool(address), address % 16, address + size <= next_address) == (True, 0, True)
     assert library("(p => [...new Uint8Array(memory.buffer, p, 15)])(c.calloc(3, 5))") == [0] * 15
 
 
 def test_string_functions_behave_as_in_c(library):
-    assert library("[c.strlen(put('')), c.strlen(put('four'))]") == [0, 4]
-    assert library("((a) => [c.strchr(a, 101) - a, c.strchr(a, 120)])(put('1e5e'))") == [1, 0]
-    assert library("['b', 'bb', 'a', 'c'].map((other) => Math.sign(c.strcmp(put('b'), put(other))))") == [0, -1, 1, -1]
-    assert library("[c.strtod(put('15e-1')), c.atoi(put('-07')), c.atoi(put('+308'))]") == [1.5, -7, 308]
-    assert bytes(library("(c.fwrite(put('tell'), 1, 4, 0), output)")) == b"tell"
+    assert library("[c.strlen(store('')), c.strlen(store('four'))]") == [0, 4]
+    assert library("((a) => [c.strchr(a, 101) - a, c.strchr(a, 120)])(store('1e5e'))") == [1, 0]
+    assert library("['b', 'bb', 'a', 'c'].map((other) => Math.sign(c.strcmp(store('b'), store(other))))") == [
+        0,
+        -1,
+        1,
+        -1,
+    ]
+    assert library("[c.strtod(store('15e-1')), c.atoi(store('-07')), c.atoi(store('+308'))]") == [1.5, -7, 308]
+    assert bytes(library("(c.fwrite(store('tell'), 1, 4, 0), output)")) == b"tell"
 
 
 def test_numbers_in_a_message_are_formatted_as_in_python(page):
