@@ -113,6 +113,6 @@ def random_record(seed, law=None, sine=None, is_quantised=None, samples=None, or
         step=step,
         order=order,
         side=rng.choice([-1.0, 1.0]),
-        seed=(seed, 1),
+        seed=(*np.ravel(seed).tolist(), 1),
     )
     return record, truth | {"omega": omega, "rest": rest}, sine
