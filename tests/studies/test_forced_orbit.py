@@ -95,6 +95,7 @@ def hartog(frequency, m=1.0, k=100.0, force=10.0, friction=6.0):
     return force / k * sqrt(1 / (1 - r * r) ** 2 - (friction / force * u) ** 2)
 
 
+@pytest.mark.slow
 def test_a_forced_oscillator_without_stops_has_the_amplitude_of_den_hartog():
     result = harness.orbit(native("forced"), over={"Omega": [5.0, 7.0, 13.0]})
     stops, *others = result.motions

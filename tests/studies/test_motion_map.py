@@ -12,6 +12,7 @@ import harness
 from tests.studies.oscillators import DELTA, STATIC, C, edge_of_stick_slip, native
 
 
+@pytest.mark.slow
 def test_the_map_of_the_belt_has_the_edges_of_closed_forms():
     """Also in worker processes; constant friction leaves steady sliding stable, and both motions possible."""
     over = {"c": [0.05, 0.1, 0.2], "v_belt": [0.1, 0.12, 1.5]}
@@ -90,6 +91,7 @@ def test_a_map_of_the_number_of_slips_has_the_edges_of_the_closed_form():
         )
 
 
+@pytest.mark.slow
 def test_points_at_which_runs_fail_are_a_region(in_workspace):
     result = harness.map_motions(native("coulomb"), {"f": [-0.25, 0.25, 0.5]}, measure="events", levels=[-1.0])
     assert result.labels == ("run failed", "-1 <= events", "-1 <= events")
