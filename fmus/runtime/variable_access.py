@@ -116,7 +116,8 @@ class VariableAccess(FailureHandling):
             ]
             terms = [f"integer_as_real({term})" if integer else term for term, integer in zip(terms, integers)]
         scope = {"blank": blank, "integer_as_real": integer_as_real}
-        values = eval(f"lambda model, run: [{', '.join(terms)}]", scope)  # the fastest way
+        items = ", ".join(terms)  # Python 3.12 writes quotes in an f-string so that older ones cannot read them
+        values = eval(f"lambda model, run: [{items}]", scope)  # the fastest way
         entry = (
             list(references),
             values,
