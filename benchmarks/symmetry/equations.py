@@ -118,14 +118,14 @@ class Equations:
             shifts = [b - a for a, b in zip(*starts, strict=True)]
             if sorted(shifts)[:-1] != [0.0] * (len(shifts) - 1) or not is_close(max(shifts), turn):
                 continue
-            place = shifts.index(max(shifts))
+            index = shifts.index(max(shifts))
             points = list(self.random_points())
-            images = [(t, (*y[:place], y[place] + turn, *y[place + 1 :]), modes) for t, y, modes in points]
+            images = [(t, (*y[:index], y[index] + turn, *y[index + 1 :]), modes) for t, y, modes in points]
             if all(
                 self.are_equal(self.evaluate_all(model, a), self.evaluate_all(turned_model, b))
                 for a, b in zip(points, images, strict=True)
             ):
-                angles[self.states[place]] = setter
+                angles[self.states[index]] = setter
         return angles
 
     def evaluate_all(self, model: Any, point: Point) -> Numbers:

@@ -229,7 +229,7 @@ def relative_path(points: list[tuple[float, float]]) -> str:
         (round(10.0 * x), round(10.0 * y)) for x, y in points
     ]  # in tenths, so that roundings do not add up
     steps = [(x - x0, y - y0) for (x0, y0), (x, y) in pairwise(rounded_points)]
-    start = "M{:g} {:g}l".format(*(place / 10.0 for place in rounded_points[0]))
+    start = "M{:g} {:g}l".format(*(coordinate / 10.0 for coordinate in rounded_points[0]))
     return start + " ".join(f"{dx / 10.0:g} {dy / 10.0:g}" for dx, dy in steps)
 
 

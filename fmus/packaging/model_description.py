@@ -242,19 +242,19 @@ def dependency_tables(
         Those of the knowns after initialization, besides the states: inputs (FMI 2.0, section 2.2.8), in FMI 3.0 also
         parameters (section 2.4.8).
     """
-    places = {name: place for place, (name, _) in enumerate(declarations)}
-    outputs = [place for place, (_, meaning) in enumerate(declarations) if meaning.causality == "output"]
+    indices = {name: index for index, (name, _) in enumerate(declarations)}
+    outputs = [index for index, (_, meaning) in enumerate(declarations) if meaning.causality == "output"]
     driver_rates = {DERIVATIVE_NAME.format(name): [meaning.rate] for name, meaning in declarations if meaning.rate}
-    later_knowns = {place for place, (_, meaning) in enumerate(declarations) if meaning.causality in causalities}
+    later_knowns = {index for index, (_, meaning) in enumerate(declarations) if meaning.causality in causalities}
     tables = []
     for unknowns, at_start, knowns in (
         (outputs, False, later_knowns.union(rates.values())),
         (rates, False, later_knowns.union(rates.values())),
-        (sorted({*outputs, *rates}), True, {*places.values()}),
+        (sorted({*outputs, *rates}), True, {*indices.values()}),
     ):
         names = output_dependencies(model, declarations, at_start) | driver_rates
         tables.append(
-            {unknown: sorted({places[n] for n in names[declarations[unknown][0]]} & knowns) for unknown in unknowns}
+            {unknown: sorted({indices[n] for n in names[declarations[unknown][0]]} & knowns) for unknown in unknowns}
         )
     return tables
 
@@ -266,6 +266,6 @@ def _add_structure(root: Element, model: type[VariableOwner], declarations: Vari
     kinds = {"Outputs": outputs} | ({"Derivatives": derivatives} if rates else {}) | {"InitialUnknowns": at_first}
     for kind, unknown in kinds.items():
         element = SubElement(structure, kind)
-        for place, knowns in unknown.items():
-            dependencies = " ".join(str(index + 1) for index in knowns)  # FMI 2.0 counts from 1
-            SubElement(element, "Unknown", index=str(place + 1), dependencies=dependencies)
+        for index, knowns in unknown.items():
+            dependencies = " ".join(str(known + 1) for known in knowns)  # FMI 2.0 counts from 1
+            SubElement(element, "Unknown", index=str(index + 1), dependencies=dependencies)

@@ -87,29 +87,28 @@ def _add_structure(root: Element, model: Any, declarations: Variables, rates: di
     """Add ModelStructure with all dependencies; for smooth models also dependenciesKind constant or tunable."""
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
     outputs, derivatives, at_first = shared.dependency_tables(model, declarations, rates, SETTABLE_CAUSALITIES)
-    for place, knowns in outputs.items():
-        _add_unknown(structure, "Output", place, knowns)
-    for place, knowns in derivatives.items():
+    for index, knowns in outputs.items():
+        _add_unknown(structure, "Output", index, knowns)
+    for index, knowns in derivatives.items():
         kind_of_factors = (
-            "" if model.has_dry_friction else "constant" if place in states else "tunable" if model.is_linear else ""
+            "" if model.has_dry_friction else "constant" if index in states else "tunable" if model.is_linear else ""
         )
         kinds = [
-            "dependent" if declarations[index][1].causality == "parameter" else kind_of_factors for index in knowns
+            "dependent" if declarations[known][1].causality == "parameter" else kind_of_factors for known in knowns
         ]
-        _add_unknown(structure, "ContinuousStateDerivative", place, knowns, kinds if kind_of_factors else [])
-    for place, knowns in at_first.items():
-        _add_unknown(structure, "InitialUnknown", place, knowns)
-    places = {name: place for place, (name, _) in enumerate(declarations)}
-    inputs = [place for place, (_, meaning) in enumerate(declarations) if meaning.causality == "input"]
-    slips = [[places[slip]] if slip else states for slip in model.contacts.values()]
+        _add_unknown(structure, "ContinuousStateDerivative", index, knowns, kinds if kind_of_factors else [])
+    for index, knowns in at_first.items():
+        _add_unknown(structure, "InitialUnknown", index, knowns)
+    indices = {name: index for index, (name, _) in enumerate(declarations)}
+    inputs = [index for index, (_, meaning) in enumerate(declarations) if meaning.causality == "input"]
+    slips = [[indices[slip]] if slip else states for slip in model.contacts.values()]
     at_rest = [state for state in states if not model.rests_when_stuck or [state] not in slips]
-    slip_of = dict(
-        zip(event_indicator_indices(declarations), slips, strict=False)
-    )  # indicators of coming to rest are first
-    for place in event_indicator_indices(declarations):
-        name, _ = declarations[place]
-        knowns = slip_of[place] if name.startswith(TO_REST) else at_rest if name.startswith(TO_BREAK_AWAY) else states
-        _add_unknown(structure, "EventIndicator", place, knowns if name.startswith(TO_REST) else knowns + inputs)
+    # indicators of coming to rest are first
+    slip_of = dict(zip(event_indicator_indices(declarations), slips, strict=False))
+    for index in event_indicator_indices(declarations):
+        name, _ = declarations[index]
+        knowns = slip_of[index] if name.startswith(TO_REST) else at_rest if name.startswith(TO_BREAK_AWAY) else states
+        _add_unknown(structure, "EventIndicator", index, knowns if name.startswith(TO_REST) else knowns + inputs)
 
 
 def _add_unknown(structure: Element, kind: str, reference: int, knowns: list[int], factors: Sequence[str] = ()) -> None:

@@ -239,9 +239,8 @@ def time_to_rest(model, step, i: ContactIndex):
     load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
     floors = contact_lcp.slip_floors(model, step, step.t0, step.y0)
     peak = location.peaks[i] if location.peaks[i] > floors[i] else floors[i]
-    unresolved_slip = (
-        RESOLVED_STEPS * TIME_RESOLUTION * step.t0 * friction[i]
-    )  # steps in which friction turns it are too short
+    # friction turns a smaller slip in steps that are too short
+    unresolved_slip = RESOLVED_STEPS * TIME_RESOLUTION * step.t0 * friction[i]
     if (size > step.tolerance * peak and size > unresolved_slip) or not load < friction[i]:
         return inf
     duration = size * (friction[i] + along) / ((friction[i] - load) * (friction[i] + load))

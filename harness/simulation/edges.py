@@ -18,7 +18,7 @@ def find_edges(
 ) -> list[tuple[Any, Any, Label, Label]]:
     """Return the edges between numbers or points a and b, as neighbours with their labels.
 
-    Where a third label is between theirs, there are several edges, unless they are closer than RESOLUTION. Of the many
+    Where a third label is between them, there are several edges, unless they are closer than RESOLUTION. Of the many
     windows of chaotic motions, not all are found: an interval is split at most `splits` times. Then the second label of
     an edge is not the first one of the next edge, or not that of b.
     """
@@ -38,7 +38,6 @@ def find_edges(
             b, label_b = middle, middle_label
         else:
             splits -= 1
-            return find_edges(label, a, middle, label_a, middle_label, splits) + find_edges(
-                label, middle, b, middle_label, label_b, splits
-            )
+            edges_below = find_edges(label, a, middle, label_a, middle_label, splits)
+            return edges_below + find_edges(label, middle, b, middle_label, label_b, splits)
     return [(a, b, label_a, label_b)]

@@ -159,9 +159,8 @@ class Clocks:
         if declaration.get("intervalDecimal") is not None:
             return float(declaration["intervalDecimal"]), float(declaration.get("shiftDecimal", 0.0))
         if declaration.get("intervalCounter") is not None:
-            return int(declaration["intervalCounter"]) / resolution, int(
-                declaration.get("shiftCounter", 0)
-            ) / resolution
+            counters = int(declaration["intervalCounter"]), int(declaration.get("shiftCounter", 0))
+            return counters[0] / resolution, counters[1] / resolution
         shift = (c_double * 1)()
         fmu = self.instance.fmu  # older versions of fmpy have methods for clocks that fail
         fmu.fmi3GetShiftDecimal(fmu.component, (c_uint * 1)(clock.reference), 1, shift)

@@ -315,9 +315,8 @@ def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     outputs = [re.sub(TIME, "", result.stdout) for result in (inside, separate)]
     assert re.sub(NUMBER, "", outputs[0]) == re.sub(NUMBER, "", outputs[1])
     numbers, other_numbers = (list(map(float, re.findall(NUMBER, text))) for text in outputs)
-    assert numbers == pytest.approx(
-        other_numbers, rel=1e-6, abs=1e-9
-    )  # sums of numpy depend on the memory alignment of an array
+    # sums of numpy depend on the memory alignment of an array
+    assert numbers == pytest.approx(other_numbers, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.campaign

@@ -11,8 +11,7 @@ def test_an_fmu_of_another_version_is_named(fmus, tmp_path):
         for name in archive.namelist():
             data = archive.read(name)
             other.writestr(name, data.replace(b"y_x", b"y_position") if name.endswith(".py") else data)
-    result = commands.run_process(
-        tmp_path, "precision", "smd"
-    )  # of its own, because both FMUs name their package alike
+    # in a process of its own, because both FMUs name their package alike
+    result = commands.run_process(tmp_path, "precision", "smd")
     assert result.returncode == 1
     assert result.stderr.startswith("Error: smd.fmu was built by another version of this project: build it again")

@@ -429,6 +429,10 @@ class _ClassBody(dict[str, Any]):
         return value
 
     def __setitem__(self, name: str, value: Any) -> None:
+        if not isinstance(name, str):
+            raise ModelError(
+                f"the name {name!r} is no identifier: use letters, digits and _, and no digit at the start"
+            )
         if isinstance(self.get(name), Expression) or (name in SETTINGS and name in self.unread_names):
             if element := getattr(self[name], "element", "") or getattr(value, "element", ""):
                 raise ModelError(f"the name {name} is reserved for {element}: choose another name")

@@ -65,7 +65,7 @@ def is_reserved_in_c(name: str) -> bool:
 
 def check_name(name: str, e: Expression) -> None:
     """Raise ModelError for a name that a variable of a model cannot have."""
-    if not str(name).isidentifier():
+    if not name.isidentifier():
         raise ModelError(
             f"the name {name!r} is no identifier: use letters, digits and _, and no digit at the start", e.location
         )

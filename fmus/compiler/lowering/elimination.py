@@ -8,10 +8,8 @@ from typing import Any
 from ...runtime import linear_solver
 from .layout import STATES, ModelLayout
 
-DECLARED_SUFFIX, EXCHANGED_SUFFIX = (
-    "_declared",
-    "_exchanged",
-)  # suffixes of names of solutions, by the order of the axes
+# of the names of solutions, by the order of the axes
+DECLARED_SUFFIX, EXCHANGED_SUFFIX = "_declared", "_exchanged"
 
 
 class Symbol:

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from scipy import optimize
 
-from ...errors import HarnessError
+from ...errors import HarnessError, command_text
 from ...records.motion import MIN_SAMPLES, Motion, selection_text
 from . import thresholds
 from .law import (
@@ -93,7 +93,9 @@ class DecayProblem:
         problem = replace(self, t=self.t[keep], x=self.x[keep])
         if not len(problem.t):
             raise FitError(
-                "is not a free decay of one oscillator: no sample follows the law that fits its turning points"
+                "is not a free decay of one oscillator: no sample follows the law that fits its turning points",
+                f"select the free decay with {selection_text()}, or use {command_text('fit', 'stickslip')} "
+                "for a driven motion",
             )
         if len(problem.t) < MIN_SAMPLES:
             raise FitError(
